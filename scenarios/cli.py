@@ -1,0 +1,245 @@
+"""The command line: ``fulcrum``."""
+
+from __future__ import annotations
+
+import contextlib
+import io
+import re
+import sys
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from datetime import datetime
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import tyro
+
+from synthesis.errors import FulcrumError, InvalidInputError
+
+if TYPE_CHECKING:
+    from sim.report import Report
+    from sim.run import Request
+
+# Heavy packages are imported by the commands that need them: `fulcrum --help` answers at once.
+
+PASSED, FAILED, BAD_INPUT, INTERRUPTED = 0, 1, 2, 130
+
+
+@dataclass(frozen=True)
+class List:
+    """List the scenarios, and the controllers and objectives to run them with."""
+
+    def execute(self) -> int:
+        """Does it; returns the exit code."""
+        from rich.console import Console
+        from rich.table import Table
+
+        from scenarios import scenarios
+        from sim.settings import Control, controllers
+        from synthesis.problem import Objective
+
+        table = Table("scenario", "what happens")
+        for scenario in scenarios().values():
+            table.add_row(scenario.name, scenario.summary)
+        console = Console()
+        console.print(table)
+        console.print(f"controllers: {', '.join(controllers(Control()))}")
+        console.print(f"objectives:  {', '.join(Objective)}")
+        return PASSED
+
+
+@dataclass(frozen=True)
+class Run:
+    """Run a scenario headless; write recording, configuration and report; print the verdict."""
+
+    scenario: tyro.conf.Positional[str]
+    """Name of the scenario (see `fulcrum list`)."""
+
+    controller: str = "margin"
+    """margin, paper or no-feedforward."""
+
+    objective: str | None = None
+    """What the synthesis minimises (see `fulcrum list`); the scenario's own if left out."""
+
+    duration: float | None = None
+    """Duration of the tilt [s]; the scenario's own if left out."""
+
+    seed: int = 0
+    """Draws the small deviations of the start posture."""
+
+    out: Path | None = None
+    """New or empty folder for the results; logs/SCENARIO-CONTROLLER-TIME if left out."""
+
+    live: bool = False
+    """Open a viewer that follows the run."""
+
+    def execute(self) -> int:
+        """Does it; returns the exit code."""
+        from sim.report import Verdict
+        from sim.run import execute as run
+
+        request = self._request()
+        assert request.out is not None
+        with _progress(self.scenario) as progress:
+            report = run(request, progress).report
+        _print_report(report, request.out)
+        codes = {Verdict.PASS: PASSED, Verdict.FAIL: FAILED, Verdict.INTERRUPTED: INTERRUPTED}
+        return codes[report.verdict]
+
+    def _request(self) -> Request:
+        from scenarios import scenario
+        from sim.run import Request
+        from sim.settings import controllers
+        from synthesis.problem import Objective
+
+        chosen = scenario(self.scenario)
+        known = controllers(chosen.control)
+        if self.controller not in known:
+            raise InvalidInputError("--controller", self.controller, f"one of {', '.join(known)}")
+        control = known[self.controller]
+        if self.objective is not None:
+            if self.objective not in list(Objective):
+                valid = f"one of {', '.join(Objective)}"
+                raise InvalidInputError("--objective", self.objective, valid)
+            control = replace(control, objective=Objective(self.objective))
+        if self.duration is not None:
+            chosen = replace(chosen, timing=replace(chosen.timing, tilt_s=self.duration))
+        if self.seed < 0:
+            raise InvalidInputError("--seed", self.seed, "an integer >= 0")
+        return Request(chosen, self.controller, control, self.seed, self._out(), self.live)
+
+    def _out(self) -> Path:
+        stamp = datetime.now().strftime("%Y%m%d-%H%M%S")
+        out = self.out or Path("logs") / f"{self.scenario}-{self.controller}-{stamp}"
+        if out.exists() and (not out.is_dir() or any(out.iterdir())):
+            raise InvalidInputError("--out", str(out), "a new or empty folder")
+        return out
+
+
+@dataclass(frozen=True)
+class Screenshot:
+    """Draw a moment of a recording as a picture, without a screen."""
+
+    run: tyro.conf.Positional[Path]
+    """Folder of a run, or an .rrd file."""
+
+    at: float
+    """Moment [s]."""
+
+    out: Path | None = None
+    """PNG to write; RUN/screenshot-AT.png if left out."""
+
+    def execute(self) -> int:
+        """Does it; returns the exit code."""
+        from sim.recording.viewer import recording_file, screenshot
+
+        picture = self.out or recording_file(self.run).parent / f"screenshot-{self.at:g}.png"
+        if not picture.parent.is_dir():
+            raise InvalidInputError("--out", str(picture), "a file in a folder that exists")
+        screenshot(self.run, self.at, picture)
+        print(picture)
+        return PASSED
+
+
+@dataclass(frozen=True)
+class View:
+    """Open a recording in the Rerun viewer."""
+
+    run: tyro.conf.Positional[Path]
+    """Folder of a run, or an .rrd file."""
+
+    def execute(self) -> int:
+        """Does it; returns the exit code."""
+        from sim.recording.viewer import view
+
+        view(self.run)
+        return PASSED
+
+
+Command = (
+    Annotated[List, tyro.conf.subcommand("list")]
+    | Annotated[Run, tyro.conf.subcommand("run")]
+    | Annotated[Screenshot, tyro.conf.subcommand("screenshot")]
+    | Annotated[View, tyro.conf.subcommand("view")]
+)
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Runs a command; returns the exit code: 0 pass, 1 failed its checks, 2 bad input."""
+    try:
+        return _parse(arguments).execute()
+    except (FulcrumError, OSError) as error:
+        print(f"fulcrum: {error}", file=sys.stderr)
+        return BAD_INPUT
+
+
+def _parse(arguments: Sequence[str] | None) -> List | Run | Screenshot | View:
+    """The command asked for; a parse error leaves as one line instead of tyro's box."""
+    errors = io.StringIO()
+    try:
+        with contextlib.redirect_stderr(errors):
+            return tyro.cli(Command, prog="fulcrum", description=_DESCRIPTION, args=arguments)
+    except SystemExit as stop:
+        if stop.code == 0:
+            raise
+        boxed = re.split(r"─{5,}", errors.getvalue())
+        words = re.sub(r"[│╭╮╰╯─\s]+", " ", boxed[1] if len(boxed) > 1 else errors.getvalue())
+        raise InvalidInputError("command line", words.strip(), "as `fulcrum --help` says") from None
+
+
+_DESCRIPTION = (
+    "Robots move objects too heavy to lift by leaning them on their surroundings: contact force "
+    "synthesis in a MuJoCo closed loop, recorded and checked."
+)
+
+
+@contextlib.contextmanager
+def _progress(name: str):  # type: ignore[no-untyped-def]
+    """A progress bar with time left, on stderr; yields the function that moves it."""
+    from rich.console import Console
+    from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
+
+    columns = (TextColumn(name), BarColumn(), TextColumn("{task.percentage:3.0f} %"))
+    console = Console(stderr=True)
+    with Progress(*columns, TimeRemainingColumn(), console=console, transient=True) as bar:
+        task = bar.add_task(name, total=None)
+        yield lambda done, total: bar.update(task, completed=done, total=total)
+
+
+def _print_report(report: Report, out: Path) -> None:
+    from rich.console import Console
+    from rich.box import SIMPLE
+    from rich.markup import escape
+    from rich.table import Table
+
+    console = Console()
+    colors = {"pass": "green", "fail": "red", "interrupted": "yellow"}
+    verdict = f"[bold {colors[report.verdict]}]{report.verdict.upper()}[/]"
+    console.print(f"{report.scenario}, controller {report.controller}: {verdict}")
+    for failure in report.failures:
+        console.print(f"  - {failure}", highlight=False)
+    table = Table("contact", "kept", "slip", "slide", "spin", "friction", "force error", box=SIMPLE)
+    table.add_row(*map(escape, ("", "[%]", "[mm]", "[mm]", "[deg]", "[%]", "[N]")), style="dim")
+    for name, c in report.contacts.items():
+        table.add_row(
+            name,
+            f"{100 * c.kept_fraction:.1f}",
+            f"{c.slip_mm:.3f}",
+            f"{c.slide_mm:.3f}",
+            f"{c.spin_deg:.3f}",
+            f"{100 * c.max_utilisation:.0f}",
+            f"{c.force_error_rms_n:.2f}",
+        )
+    console.print(table)
+    tilt, torque, timing = report.tilt, report.torque, report.timing
+    console.print(
+        f"tilt {tilt.final_deg:.2f} of {tilt.target_deg:g} deg, error at most "
+        f"{tilt.max_error_deg:.3f} deg; torque at most {100 * torque.max_utilisation:.0f} % of its "
+        f"limit ({torque.joint}); {timing.real_time_factor:.1f} x real time",
+        highlight=False,
+    )
+    console.print(f"recording: {out / (report.recording or '')}", highlight=False, soft_wrap=True)
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,113 @@
+r"""Turns measured states into joint torques: synthesised feed-forward and joint impedance.
+
+.. math:: \tau = g(q) + s\,J^T f^* + D \dot q_d
+                 + M(q) \left( \omega^2 (q_d - q) + 2 \omega (\dot q_d - \dot q) \right)
+
+with :math:`f^*` the solution of (17) at the last synthesis, s the share of grip that the schedule
+asks for and D the joints' viscous friction. The mass matrix M gives every joint, light or heavy,
+the same bandwidth :math:`\omega`: damping that is explicit in time stays stable on light wrists.
+"""
+
+from __future__ import annotations
+
+import time
+from dataclasses import dataclass
+
+import numpy as np
+
+from sim.ik import JointPath
+from sim.path import Schedule
+from sim.plant import Measurement
+from sim.robot import RobotModel
+from sim.scenario import Scenario
+from sim.settings import Control
+from sim.statics import Statics
+from synthesis import InfeasibleError, SolverError, Synthesizer, UnboundedError
+from synthesis.contact import Array
+
+
+@dataclass(frozen=True, eq=False)
+class Command:
+    """What the controller asks of the motors, and why.
+
+    Attributes:
+        tau: Torques within the limits [N·m or N], (l,).
+        saturated: Which torques were cut at their limit, (l,).
+        q_ref: Reference angles [rad or m], (l,).
+        tilt_ref: Reference tilt [rad].
+        w_OC_C: Commanded wrenches on the object in contact axes [N, N·m], (m, 6).
+        synthesis_s: Wall time of this tick's synthesis [s]; 0 where none was due.
+        failed: Whether this tick's synthesis had no solution, so that the last one was kept.
+    """
+
+    tau: Array
+    saturated: Array
+    q_ref: Array
+    tilt_ref: float
+    w_OC_C: Array
+    synthesis_s: float
+    failed: bool
+
+
+class Controller:
+    """Quasi-static force control along the path; holds the last synthesised forces."""
+
+    def __init__(
+        self,
+        scenario: Scenario,
+        control: Control,
+        robot: RobotModel,
+        joint_path: JointPath,
+        schedule: Schedule,
+    ) -> None:
+        self._control = control
+        self._robot = robot
+        self._path, self._schedule = joint_path, schedule
+        self._statics = Statics(scenario, control, robot)
+        self._synthesizer = Synthesizer()
+        self._tick = 0
+        self._w_OC_C = np.zeros((len(scenario.contact_names), 6))
+        self._mass_matrix = np.zeros((len(robot.joints), len(robot.joints)))
+        self._tau_g = np.zeros(len(robot.joints))
+        self._tau_f = np.zeros(len(robot.joints))
+
+    def command(self, measurement: Measurement) -> Command:
+        """The torques for the next step."""
+        t = measurement.t
+        tilt, rate = self._schedule.tilt(t)
+        q_ref, slope = self._path(tilt)
+        synthesis_s, failed = 0.0, False
+        if self._tick % self._control.solve_every == 0:
+            started = time.perf_counter()
+            failed = not self._synthesize(measurement)
+            synthesis_s = time.perf_counter() - started
+        self._tick += 1
+        share = float(self._schedule.grip(t)) if self._control.feedforward else 0.0
+        qd_ref = slope * rate
+        tau = self._tau_g + share * self._tau_f + self._robot.damping * qd_ref
+        omega = self._control.bandwidth
+        acceleration = omega**2 * (q_ref - measurement.q) + 2.0 * omega * (qd_ref - measurement.qd)
+        tau += self._mass_matrix @ acceleration
+        limited = np.clip(tau, self._robot.tau_min, self._robot.tau_max)
+        return Command(
+            tau=limited,
+            saturated=limited != tau,
+            q_ref=q_ref,
+            tilt_ref=float(tilt),
+            w_OC_C=share * self._w_OC_C,
+            synthesis_s=synthesis_s,
+            failed=failed,
+        )
+
+    def _synthesize(self, measurement: Measurement) -> bool:
+        problem = self._statics.problem(measurement)
+        assert problem.joints is not None
+        self._tau_g = problem.joints.tau_g
+        self._mass_matrix = self._robot.mass_matrix()
+        try:
+            solution = self._synthesizer.solve(problem)
+        except (InfeasibleError, UnboundedError, SolverError):
+            return False
+        self._w_OC_C = solution.w_OC_C
+        self._tau_f = solution.tau - self._tau_g
+        return True

@@ -1,0 +1,245 @@
+"""Joint path for the object's path: mink solves for the arms, and says which limit stops it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import mink
+import mujoco
+import numpy as np
+from scipy.interpolate import CubicSpline
+from scipy.spatial.transform import Rotation
+
+from assets import velocity_limits
+from sim.contacts import ContactFrames
+from sim.path import Schedule, ScrewPath
+from sim.scenario import Scenario
+from sim.scene import ObjectMotion, compose, tip_geom, tip_site
+from synthesis import FulcrumError
+from synthesis.contact import Array
+
+# A cubic spline through 1 deg steps follows the hands' circle to under a micrometre.
+_STEP_DEG = 1.0
+_ITERATIONS = 50
+# Pose error at which a step counts as solved [m and rad].
+_SOLVED = 1e-9
+# Gauss-Newton damping: small against the squared singular values of the task (> 0.01).
+_DAMPING = 1e-8
+# Clearance that links keep from each other and from the scene, and from where they look out [m].
+_CLEARANCE, _DETECTION = 0.005, 0.05
+# How near to a limit counts as being at it [rad, m, or share of the speed limit].
+_AT_LIMIT = 1e-3
+_NAMED_COLLISIONS = 3
+
+
+class PathError(FulcrumError):
+    """The arms cannot follow the object's path; says from which tilt on, and which limit stops."""
+
+    def __init__(self, tilt_deg: float, error: float, reasons: list[str]) -> None:
+        self.tilt_deg = tilt_deg
+        self.reasons = reasons
+        super().__init__(
+            f"inverse kinematics follows the path only up to a tilt of {tilt_deg:.1f} deg "
+            f"(pose error {error:.2g} m/rad): {'; '.join(reasons)}."
+        )
+
+
+@dataclass(frozen=True, eq=False)
+class JointPath:
+    """Joint angles as a function of the tilt.
+
+    Attributes:
+        tilts: Grid of tilts [rad], (k,).
+        q: Joint angles [rad or m] at the grid, (k, l), in the order of the scene's motors.
+        clearance: Smallest distance to a joint limit over the path [rad or m], (l,).
+    """
+
+    tilts: Array
+    q: Array
+    clearance: Array
+
+    @cached_property
+    def _spline(self) -> CubicSpline:
+        return CubicSpline(self.tilts, self.q)
+
+    def __call__(self, tilt: Array | float) -> tuple[Array, Array]:
+        """Angles, (..., l), and their derivatives by the tilt, (..., l), at tilts [rad]."""
+        return self._spline(tilt), self._spline(tilt, 1)
+
+
+def plan_joints(scenario: Scenario, path: ScrewPath, schedule: Schedule) -> JointPath:
+    """Follows the path with all hands, within joint, speed and collision limits.
+
+    Raises:
+        PathError: A limit stops the arms; names it and the tilt.
+    """
+    return _Follower(scenario, path).follow(schedule)
+
+
+class _Follower:
+    def __init__(self, scenario: Scenario, path: ScrewPath) -> None:
+        self._scenario, self._path = scenario, path
+        self._frames = ContactFrames(scenario)
+        spec = compose(scenario, ObjectMotion.POSED)
+        # mink leaves out geoms that physics would not let collide; no physics runs in this scene.
+        for geom in spec.geoms:
+            geom.contype = geom.conaffinity = 1
+        self._model = model = spec.compile()
+        self._object = model.body(scenario.object.name).mocapid[0]
+        self._configuration = mink.Configuration(model)
+        self._tasks = [
+            mink.FrameTask(tip_site(hand), "site", position_cost=1.0, orientation_cost=1.0)
+            for hand in scenario.hands
+        ]
+        self._radii = [float(model.geom(tip_geom(hand)).size[0]) for hand in scenario.hands]
+        self._motor_dofs = [int(model.actuator(i).trnid[0]) for i in range(model.nu)]
+        self._qd_max = np.array(
+            [velocity_limits(model)[model.joint(j).name] for j in range(model.njnt)]
+        )
+        q = np.array([scenario.robot.posture[model.joint(j).name] for j in range(model.njnt)])
+        self._configuration.update(q)
+        self._pose_object(0.0)
+        self._collisions = mink.CollisionAvoidanceLimit(
+            model,
+            self._collision_pairs(),
+            minimum_distance_from_collisions=_CLEARANCE,
+            collision_detection_distance=_DETECTION,
+        )
+
+    def follow(self, schedule: Schedule) -> JointPath:
+        steps = max(2, int(np.ceil(np.degrees(self._path.end) / _STEP_DEG)) + 1)
+        tilts = np.linspace(0.0, self._path.end, steps)
+        durations = np.diff(schedule.times(tilts))
+        self._reach(0.0, None, None)
+        q = [self._configuration.q.copy()]
+        for previous, tilt, duration in zip(tilts, tilts[1:], durations, strict=False):
+            self._reach(float(tilt), float(previous), float(duration))
+            q.append(self._configuration.q.copy())
+        joints = np.array(q)
+        low, high = self._model.jnt_range.T
+        clearance = np.minimum(joints - low, high - joints).min(axis=0)
+        order = self._motor_dofs
+        return JointPath(tilts=tilts, q=joints[:, order], clearance=clearance[order])
+
+    def _reach(self, tilt: float, previous: float | None, duration: float | None) -> None:
+        """Brings the hands to a tilt, within a duration [s] if one is given."""
+        self._pose_object(tilt)
+        for task, target in zip(self._tasks, self._tip_poses(tilt), strict=True):
+            task.set_target(target)
+        limits: list[mink.Limit] = [mink.ConfigurationLimit(self._model), self._collisions]
+        dt = 1.0
+        if duration is not None:
+            dt = duration
+            names = [self._model.joint(j).name for j in range(self._model.njnt)]
+            limits.append(
+                mink.VelocityLimit(self._model, dict(zip(names, self._qd_max, strict=True)))
+            )
+        start = self._configuration.q.copy()
+        for _ in range(_ITERATIONS):
+            if self._error() < _SOLVED:
+                break
+            try:
+                velocity = mink.solve_ik(
+                    self._configuration, self._tasks, dt, "daqp", _DAMPING, limits=limits
+                )
+            except mink.NoSolutionFound:
+                break
+            self._configuration.integrate_inplace(velocity, dt)
+        moved = np.abs(self._configuration.q - start)
+        too_fast = np.zeros(len(moved), bool)
+        if duration is not None:
+            too_fast = moved >= (1.0 - _AT_LIMIT) * duration * self._qd_max
+        if self._error() >= _SOLVED or too_fast.any():
+            reached = tilt if previous is None else previous
+            raise PathError(float(np.degrees(reached)), self._error(), self._reasons(too_fast))
+
+    def _tip_poses(self, tilt: float) -> list[mink.SE3]:
+        """Poses in the world of the hands' tips that touch the object at a tilt [rad]."""
+        R_WO, p_WO = self._path.pose(tilt)
+        R_WC = self._frames.in_world(R_WO)
+        p_WC = self._frames.points(R_WO, p_WO)
+        poses = []
+        for R, p, radius in zip(R_WC, p_WC, self._radii, strict=False):
+            orientation = mink.SO3(Rotation.from_matrix(R).as_quat(scalar_first=True))
+            poses.append(mink.SE3.from_rotation_and_translation(orientation, p - radius * R[:, 2]))
+        return poses
+
+    def _error(self) -> float:
+        return max(
+            float(np.abs(task.compute_error(self._configuration)).max()) for task in self._tasks
+        )
+
+    def _reasons(self, too_fast: Array) -> list[str]:
+        model, q = self._model, self._configuration.q
+        reasons = []
+        for j in range(model.njnt):
+            name, (low, high) = model.joint(j).name, model.jnt_range[j]
+            if too_fast[j]:
+                reasons.append(f"{name} at its speed limit {self._qd_max[j]:g} rad/s")
+            if q[j] - low < _AT_LIMIT:
+                reasons.append(f"{name} at its lower limit {low:.3f} rad")
+            if high - q[j] < _AT_LIMIT:
+                reasons.append(f"{name} at its upper limit {high:.3f} rad")
+        near = sorted(
+            (distance, first, second)
+            for first, second in self._collisions.geom_id_pairs
+            if (distance := self._distance(first, second)) < _CLEARANCE + _AT_LIMIT
+        )
+        reasons += [
+            f"{model.geom(first).name} within {_CLEARANCE * 1e3:g} mm of {model.geom(second).name}"
+            for _, first, second in near[:_NAMED_COLLISIONS]
+        ]
+        return reasons or ["out of reach of the arms"]
+
+    def _distance(self, first: int, second: int) -> float:
+        data = self._configuration.data
+        return mujoco.mj_geomDistance(self._model, data, first, second, _DETECTION, None)
+
+    def _pose_object(self, tilt: float) -> None:
+        R_WO, p_WO = self._path.pose(tilt)
+        data = self._configuration.data
+        data.mocap_pos[self._object] = p_WO
+        data.mocap_quat[self._object] = Rotation.from_matrix(R_WO).as_quat(scalar_first=True)
+        self._configuration.update()
+
+    def _collision_pairs(self) -> list[tuple[list[str], list[str]]]:
+        """Links against links, object and environment; not the tips against what they touch.
+
+        Left out, as the collision primitives of joint housings overlap by construction: link
+        pairs with at most three joints between them, and those that overlap in the start posture.
+        """
+        model, scenario = self._model, self._scenario
+        surroundings = [g.name for g in (*scenario.object.geoms, *scenario.environment)]
+        links = [
+            model.geom(g).name for g in range(model.ngeom) if model.geom(g).name not in surroundings
+        ]
+        moving = [name for name in links if model.body_weldid[model.geom(name).bodyid[0]] != 0]
+        touching = {(tip_geom(hand), hand.geom) for hand in scenario.hands}
+        pairs = [
+            ([link], [other])
+            for link in moving
+            for other in surroundings
+            if (link, other) not in touching
+        ]
+        for i, link in enumerate(moving):
+            for other in (*moving[i + 1 :], *(name for name in links if name not in moving)):
+                first, second = model.geom(link), model.geom(other)
+                if not self._near_in_chain(first.bodyid[0], second.bodyid[0]) and (
+                    self._distance(first.id, second.id) > 0.0
+                ):
+                    pairs.append(([link], [other]))
+        return pairs
+
+    def _near_in_chain(self, first: int, second: int) -> bool:
+        """Whether at most three joints lie between two bodies of one chain."""
+        a, b = self._ancestors(first), self._ancestors(second)
+        return a[0] in b or b[0] in a
+
+    def _ancestors(self, body: int) -> list[int]:
+        """The body and the next three that a joint carries it on, each by its weld group."""
+        weld, parent = self._model.body_weldid, self._model.body_parentid
+        chain = [int(weld[body])]
+        for _ in range(3):
+            chain.append(int(weld[parent[chain[-1]]]))
+        return chain

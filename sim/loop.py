@@ -1,0 +1,100 @@
+"""The closed loop: measured state, contact problem, torques, step; until done or stopped."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from sim.contacts import ContactFrames
+from sim.controller import Controller
+from sim.ik import plan_joints
+from sim.path import Schedule, ScrewPath
+from sim.plant import Measurement, Plant
+from sim.robot import RobotModel
+from sim.scenario import Scenario
+from sim.settings import Control
+from sim.trace import Trace
+
+# Steps per block that is handed on while the loop runs [s]; what an abrupt end may lose.
+_BLOCK_S = 0.1
+
+
+class ClosedLoop:
+    """One run of a scenario.
+
+    Attributes:
+        robot: The controller's belief about the robot.
+        trace: The whole run; filled up to ``steps`` rows.
+        steps: How many steps have been made.
+        total_steps: How many the schedule asks for.
+    """
+
+    def __init__(
+        self,
+        scenario: Scenario,
+        control: Control,
+        truth: Scenario | None = None,
+        seed: int = 0,
+    ) -> None:
+        """Plans the joint path and sets up plant and controller.
+
+        Args:
+            scenario: What the controller believes.
+            control: The controller.
+            truth: What the plant is; the scenario if left out.
+            seed: Draws the deviations of the start posture.
+
+        Raises:
+            PathError: The arms cannot follow the path.
+        """
+        self._path = ScrewPath(scenario.path)
+        schedule = Schedule(scenario.timing, self._path.end)
+        self.robot = robot = RobotModel(scenario)
+        joint_path = plan_joints(scenario, self._path, schedule)
+        self._controller = Controller(scenario, control, robot, joint_path, schedule)
+        self._plant = Plant(truth or scenario)
+        deviation = np.random.default_rng(seed).normal(size=len(robot.joints))
+        self._plant.reset(joint_path.q[0] + scenario.robot.start_deviation * deviation)
+        dt = (truth or scenario).physics.timestep
+        self.steps = 0
+        self.total_steps = round(scenario.timing.total_s / dt)
+        self._block = max(1, round(_BLOCK_S / dt))
+        self.trace = Trace.allocate(
+            self.total_steps, len(robot.joints), len(scenario.hands), len(scenario.contact_names)
+        )
+        self._p_WC = ContactFrames(scenario).points(*self._path.pose(0.0))
+
+    def run(self) -> Iterator[Trace]:
+        """Steps to the end, handing over each block of rows as soon as it is full."""
+        while self.steps < self.total_steps:
+            start = self.steps
+            stop = min(start + self._block, self.total_steps)
+            for row in range(start, stop):
+                self._step(row)
+                self.steps = row + 1
+            block = self.trace.rows(start, stop)
+            block.tilt[:] = self._path.tilt(block.quat_WO)
+            yield block
+
+    def _step(self, row: int) -> None:
+        trace, plant = self.trace, self._plant
+        measurement = plant.measure()
+        command = self._controller.command(measurement)
+        plant.apply(command.tau)
+        plant.step()
+        self._write_state(row, measurement)
+        trace.q_ref[row], trace.tilt_ref[row] = command.q_ref, command.tilt_ref
+        trace.tau[row], trace.saturated[row] = command.tau, command.saturated
+        trace.w_command_C[row] = command.w_OC_C
+        trace.synthesis_s[row], trace.failed[row] = command.synthesis_s, command.failed
+        plant.tips(trace.p_WE[row], trace.quat_WE[row], trace.twist_WE[row])
+        plant.object_twist(trace.twist_WO[row])
+        plant.contacts(self._p_WC, trace.f_W[row])
+        trace.p_WC[row] = self._p_WC
+
+    def _write_state(self, row: int, measurement: Measurement) -> None:
+        trace = self.trace
+        trace.t[row] = measurement.t
+        trace.q[row], trace.qd[row] = measurement.q, measurement.qd
+        trace.p_WO[row], trace.quat_WO[row] = measurement.p_WO, measurement.quat_WO

@@ -1,0 +1,55 @@
+"""How a recording opens: the scene beside the curves that a reviewer looks at."""
+
+from __future__ import annotations
+
+import rerun.blueprint as rrb
+
+from sim.scenario import Scenario
+from synthesis.contact import Array
+
+TIMELINE = "time"
+# Where the eye stands and looks, relative to the path's axis: in front, beside and above [m].
+_EYE, _TARGET = (1.0, -0.5, 0.62), (0.05, 0.0, 0.12)
+_BACKGROUND = (222, 226, 232)
+
+_CURVES = (
+    ("tilt", "Tilt [deg]", rrb.Corner2D.RightBottom),
+    ("tilt_error", "Tilt error [deg]", rrb.Corner2D.RightBottom),
+    ("normal_force", "Normal force [N]", rrb.Corner2D.RightTop),
+    ("utilisation", "Friction utilisation [-]", rrb.Corner2D.RightTop),
+    ("slip", "Slip [mm]", rrb.Corner2D.LeftTop),
+    ("torque", "Torque over its limit [-]", rrb.Corner2D.RightTop),
+    ("synthesis", "Synthesis time [us]", rrb.Corner2D.RightTop),
+)
+
+
+def blueprint(scenario: Scenario, center: Array) -> rrb.Blueprint:
+    """The layout for a scenario whose action is at a point in the world [m]."""
+    eye = rrb.EyeControls3D(position=center + _EYE, look_target=center + _TARGET)
+    scene = rrb.Spatial3DView(
+        origin="/",
+        contents=["/world/**", "/forces/**", "/cones/**"],
+        name=scenario.name,
+        eye_controls=eye,
+        background=_BACKGROUND,
+    )
+    curves = [
+        rrb.TimeSeriesView(origin=f"plots/{name}", name=title, plot_legend=corner)
+        for name, title, corner in _CURVES
+    ]
+    texts = rrb.Tabs(
+        rrb.TextDocumentView(origin="verdict", name="Verdict"),
+        rrb.TextDocumentView(origin="config", name="Config"),
+    )
+    return rrb.Blueprint(
+        rrb.Horizontal(
+            scene,
+            rrb.Grid(*curves, texts, grid_columns=2),
+            column_shares=[5, 6],
+        ),
+        rrb.TimePanel(timeline=TIMELINE, state="collapsed"),
+        rrb.BlueprintPanel(state="collapsed"),
+        rrb.SelectionPanel(state="collapsed"),
+        auto_layout=False,
+        auto_views=False,
+    )

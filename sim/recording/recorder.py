@@ -1,0 +1,193 @@
+"""Writes a run to a Rerun recording while it runs."""
+
+from __future__ import annotations
+
+import colorsys
+import json
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+import rerun as rr
+from rerun.components import AggregationPolicy
+
+from sim.contacts import true_contacts
+from sim.monitor import ContactHistory
+from sim.recording.blueprint import TIMELINE, blueprint
+from sim.recording.scenery import Scenery
+from sim.scenario import Scenario
+from sim.trace import Trace
+from synthesis.contact import Array, N
+
+_POSE_PERIOD = 0.02  # [s] between poses in the 3D view
+_METERS_PER_NEWTON = 0.003
+_CONE_LENGTH = 0.06  # [m]
+_CONE_RAYS = 6
+_CONE = (250, 190, 40)
+
+
+class _Arrow(NamedTuple):
+    color: tuple[int, ...]
+    radius: float  # [m]
+
+
+# The commanded arrow is the thin core of the measured one, and shows where they disagree.
+_MEASURED = _Arrow((220, 30, 30), 0.006)
+_COMMANDED = _Arrow((40, 110, 250), 0.002)
+
+
+class Recorder:
+    """Streams blocks of a run into a file, and to a viewer if asked to.
+
+    Force arrows are the forces on the object: they start at their contact, as does the friction
+    cone, in which they must lie. They point into the object, which is shown translucent.
+    """
+
+    def __init__(
+        self,
+        path: Path,
+        scenario: Scenario,
+        config: dict[str, Any],
+        joints: tuple[str, ...],
+        tau_min: Array,
+        tau_max: Array,
+        live: bool = False,
+    ) -> None:
+        """Opens the file and writes everything that does not change.
+
+        Args:
+            path: File to write.
+            scenario: What runs.
+            config: Resolved configuration, shown as text.
+            joints: Names of the l driven joints.
+            tau_min: Torque limits [N·m or N], (l,).
+            tau_max: Torque limits [N·m or N], (l,).
+            live: Whether to open a viewer that follows the run.
+        """
+        self._scenario = scenario
+        self._contacts = true_contacts(scenario)
+        self._tau_min, self._tau_max = tau_min, tau_max
+        self._stride = max(1, round(_POSE_PERIOD / scenario.physics.timestep))
+        # Viewers keep the first blueprint they see per application id.
+        self._recording = rr.RecordingStream(f"fulcrum {scenario.name}")
+        sinks: list[Any] = [rr.FileSink(path)]
+        if live:
+            rr.spawn(connect=False)
+            sinks.append(rr.GrpcSink())
+        layout = blueprint(scenario, np.asarray(scenario.path.point_W))
+        self._recording.set_sinks(*sinks, default_blueprint=layout)
+        self._scenery = Scenery(scenario, joints)
+        self._scenery.log_shapes(self._recording)
+        self._log_static(config, joints)
+
+    def _log_static(self, config: dict[str, Any], joints: tuple[str, ...]) -> None:
+        text = f"```json\n{json.dumps(config, indent=2)}\n```"
+        self._log_text("config", text)
+        self._log_text("verdict", "The run has not ended.")
+        names = self._scenario.contact_names
+        forces = [f"{n} {kind}" for kind in ("commanded", "measured") for n in names]
+        bright = colors(len(names))
+        pale = [_pale(color) for color in bright]
+        limit = [(120, 120, 120)] * 2
+        for path, series, palette in (
+            ("tilt", ["reference", "measured"], [_pale(bright[0]), bright[0]]),
+            ("tilt_error", ["measured - reference"], bright[:1]),
+            ("normal_force", forces, [*pale, *bright]),
+            ("utilisation", list(names), bright),
+            ("slip", list(names), bright),
+            ("torque", [*joints, "lower limit", "upper limit"], [*colors(len(joints)), *limit]),
+            ("synthesis", ["synthesis"], bright[:1]),
+        ):
+            lines = rr.SeriesLines(
+                names=series, colors=palette, aggregation_policy=AggregationPolicy.MinMax
+            )
+            self._recording.log(f"plots/{path}", lines, static=True)
+        for contact in self._contacts:
+            self._recording.log(f"cones/{contact.name}", _cone(contact.mu), static=True)
+
+    def _log_text(self, path: str, text: str) -> None:
+        document = rr.TextDocument(text, media_type=rr.MediaType.MARKDOWN)
+        self._recording.log(path, document, static=True)
+
+    def write(self, block: Trace, history: ContactHistory) -> None:
+        """Appends the next rows of the run."""
+        time = rr.TimeColumn(TIMELINE, duration=block.t)
+        tilt = np.degrees(np.column_stack([block.tilt_ref, block.tilt]))
+        self._send("tilt", time, tilt)
+        self._send("tilt_error", time, tilt[:, 1:] - tilt[:, :1])
+        normal = np.column_stack([block.w_command_C[..., N], history.w_OC_C[..., N]])
+        self._send("normal_force", time, normal)
+        self._send("utilisation", time, np.where(history.kept, history.utilisation, 0.0))
+        self._send("slip", time, 1e3 * history.slip)
+        share = np.maximum(block.tau / self._tau_max, block.tau / self._tau_min)
+        limits = np.broadcast_to([-1.0, 1.0], (len(block), 2))
+        self._send("torque", time, np.column_stack([share * np.sign(block.tau), limits]))
+        due = block.synthesis_s > 0.0
+        if due.any():
+            solves = rr.TimeColumn(TIMELINE, duration=block.t[due])
+            self._send("synthesis", solves, 1e6 * block.synthesis_s[due, None])
+        self._send_scene(block, history)
+
+    def _send(self, path: str, time: rr.TimeColumn, values: Array) -> None:
+        rows, series = values.shape
+        columns = rr.Scalars.columns(scalars=values.ravel()).partition([series] * rows)
+        self._recording.send_columns(f"plots/{path}", [time], columns)
+
+    def _send_scene(self, block: Trace, history: ContactHistory) -> None:
+        first = -round(block.t[0] / self._scenario.physics.timestep) % self._stride
+        picked = np.arange(first, len(block), self._stride)
+        if not picked.size:
+            return
+        rows = block.pick(picked)
+        time = rr.TimeColumn(TIMELINE, duration=rows.t)
+        self._scenery.send_poses(self._recording, rows, time)
+        R_WC = history.R_WC[picked]
+        commanded = np.einsum("kmij,kmj->kmi", R_WC, rows.w_command_C[..., :3])
+        for i, contact in enumerate(self._contacts):
+            origins = rows.p_WC[:, i]
+            self._send_arrows(
+                f"measured/{contact.name}", time, origins, rows.f_W[:, i, :3], _MEASURED
+            )
+            self._send_arrows(
+                f"commanded/{contact.name}", time, origins, commanded[:, i], _COMMANDED
+            )
+            columns = rr.Transform3D.columns(translation=rows.p_WC[:, i], mat3x3=R_WC[:, i])
+            self._recording.send_columns(f"cones/{contact.name}", [time], columns)
+
+    def _send_arrows(
+        self, path: str, time: rr.TimeColumn, origins: Array, forces: Array, look: _Arrow
+    ) -> None:
+        vectors = _METERS_PER_NEWTON * forces
+        columns = rr.Arrows3D.columns(
+            vectors=vectors,
+            origins=origins,
+            colors=[look.color] * len(origins),
+            radii=[look.radius] * len(origins),
+        )
+        self._recording.send_columns(f"forces/{path}", [time], columns)
+
+    def close(self, verdict: str) -> None:
+        """Writes the verdict, as Markdown, and completes the file."""
+        self._log_text("verdict", verdict)
+        self._recording.flush()
+        self._recording.disconnect()
+
+
+def colors(count: int) -> list[tuple[int, ...]]:
+    """Distinct colours, evenly spaced in hue."""
+    hues = (np.arange(count) / max(count, 1) + 0.02) % 1.0
+    return [tuple(round(255 * x) for x in colorsys.hsv_to_rgb(hue, 0.75, 0.95)) for hue in hues]
+
+
+def _pale(color: tuple[int, ...]) -> tuple[int, ...]:
+    return tuple(round(0.45 * channel + 0.55 * 255) for channel in color)
+
+
+def _cone(mu: float) -> rr.LineStrips3D:
+    """Wire cone of friction mu with its apex at the contact, around the normal."""
+    angles = np.linspace(0.0, 2.0 * np.pi, _CONE_RAYS, endpoint=False)
+    rim = _CONE_LENGTH * np.column_stack(
+        [mu * np.cos(angles), mu * np.sin(angles), np.ones(_CONE_RAYS)]
+    )
+    rays = [np.array([np.zeros(3), point]) for point in rim]
+    return rr.LineStrips3D([*rays, np.vstack([rim, rim[:1]])], radii=0.0003, colors=[_CONE])

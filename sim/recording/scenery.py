@@ -1,0 +1,139 @@
+"""What stands in a recording's 3D view: the scene's shapes, and where they are over time."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import mujoco
+import numpy as np
+import rerun as rr
+
+from assets import description_path
+from assets.visuals import Visual, load_visuals
+from sim.scenario import Scenario
+from sim.scene import ObjectMotion, compose, hand_body
+from sim.trace import Trace
+from synthesis.contact import Array
+
+WORLD = "world"
+# Edge length of what stands for an infinite plane, and its thickness [m].
+_PLANE_SIZE, _PLANE_THICKNESS = 2.0, 0.002
+
+
+class Scenery:
+    """Static shapes and moving bodies of a scenario, posed by the scene's own kinematics."""
+
+    def __init__(self, scenario: Scenario, joints: tuple[str, ...]) -> None:
+        self._scenario = scenario
+        self._model = compose(scenario, ObjectMotion.POSED).compile()
+        self._data = mujoco.MjData(self._model)
+        self._q = np.array([int(self._model.joint(name).qposadr[0]) for name in joints])
+        self._object = int(self._model.body(scenario.object.name).mocapid[0])
+        self._visuals = self._load_visuals()
+        shown = {self._model.body(visual.link).id for visual in self._visuals}
+        shown |= {int(self._model.geom_bodyid[g]) for g in self._primitives()}
+        bodies = np.array(sorted(shown))
+        moves = (self._model.body_weldid[bodies] != 0) | (self._model.body_mocapid[bodies] >= 0)
+        self._moving, self._fixed = bodies[moves], bodies[~moves]
+
+    def _load_visuals(self) -> list[Visual]:
+        if self._scenario.robot.description is None:
+            return []
+        names = {self._model.body(b).name for b in range(self._model.nbody)}
+        urdf = description_path(self._scenario.robot.description).read_text()
+        return load_visuals(urdf, names)
+
+    def _primitives(self) -> Iterator[int]:
+        """Visible geoms; the robot's own collision primitives only where it has no meshes."""
+        scenario = self._scenario
+        own = {g.name for g in (*scenario.object.geoms, *scenario.environment)}
+        hands = {self._model.body(hand_body(hand)).id for hand in scenario.hands}
+        for g in range(self._model.ngeom):
+            is_own = self._model.geom(g).name in own or int(self._model.geom_bodyid[g]) in hands
+            if is_own or (not self._visuals and self._model.geom_group[g] == 0):
+                yield g
+
+    def log_shapes(self, recording: rr.RecordingStream) -> None:
+        """Logs everything that does not change."""
+        recording.log(WORLD, rr.ViewCoordinates.RIGHT_HAND_Z_UP, static=True)
+        for i, visual in enumerate(self._visuals):
+            path = f"{self._path(self._model.body(visual.link).id)}/mesh_{i}"
+            recording.log(path, _transform(visual.X_LM), static=True)
+            recording.log(
+                path,
+                rr.Mesh3D(
+                    vertex_positions=visual.vertices,
+                    triangle_indices=visual.faces,
+                    vertex_normals=visual.normals,
+                    vertex_colors=visual.colors,
+                ),
+                static=True,
+            )
+        for g in self._primitives():
+            geom = self._model.geom(g)
+            path = f"{self._path(int(geom.bodyid[0]))}/{geom.name}"
+            recording.log(path, _shape(self._model, g), static=True)
+        mujoco.mj_kinematics(self._model, self._data)
+        for body in self._fixed:
+            recording.log(
+                self._path(body),
+                rr.Transform3D(
+                    translation=self._data.xpos[body],
+                    quaternion=rr.Quaternion(xyzw=np.roll(self._data.xquat[body], -1)),
+                ),
+                static=True,
+            )
+
+    def send_poses(self, recording: rr.RecordingStream, rows: Trace, time: rr.TimeColumn) -> None:
+        """Sends the poses of all moving bodies at the given rows."""
+        positions = np.empty((len(self._moving), len(rows), 3))
+        quaternions = np.empty((len(self._moving), len(rows), 4))
+        for k in range(len(rows)):
+            self._data.qpos[self._q] = rows.q[k]
+            self._data.mocap_pos[self._object] = rows.p_WO[k]
+            self._data.mocap_quat[self._object] = rows.quat_WO[k]
+            mujoco.mj_kinematics(self._model, self._data)
+            positions[:, k] = self._data.xpos[self._moving]
+            quaternions[:, k] = self._data.xquat[self._moving]
+        for body, position, quaternion in zip(self._moving, positions, quaternions, strict=True):
+            recording.send_columns(
+                self._path(body),
+                [time],
+                rr.Transform3D.columns(
+                    translation=position, quaternion=np.roll(quaternion, -1, axis=1)
+                ),
+            )
+
+    def _path(self, body: int) -> str:
+        return f"{WORLD}/{self._model.body(body).name}"
+
+
+def _transform(X: Array) -> rr.Transform3D:
+    return rr.Transform3D(translation=X[:3, 3], mat3x3=X[:3, :3])
+
+
+def _shape(model: mujoco.MjModel, g: int) -> rr.AsComponents:
+    geom = model.geom(g)
+    size = geom.size
+    placed = {
+        "centers": [geom.pos],
+        "quaternions": [rr.Quaternion(xyzw=np.roll(geom.quat, -1))],
+        "colors": [(255 * geom.rgba).astype(np.uint8)],
+        "fill_mode": "solid",
+    }
+    match mujoco.mjtGeom(int(geom.type[0])):
+        case mujoco.mjtGeom.mjGEOM_BOX:
+            return rr.Boxes3D(half_sizes=[size], **placed)
+        case mujoco.mjtGeom.mjGEOM_SPHERE:
+            return rr.Ellipsoids3D(half_sizes=[np.full(3, size[0])], **placed)
+        case mujoco.mjtGeom.mjGEOM_ELLIPSOID:
+            return rr.Ellipsoids3D(half_sizes=[size], **placed)
+        case mujoco.mjtGeom.mjGEOM_CYLINDER:
+            return rr.Cylinders3D(radii=[size[0]], lengths=[2 * size[1]], **placed)
+        case mujoco.mjtGeom.mjGEOM_CAPSULE:
+            placed["translations"] = [geom.pos - [0, 0, size[1]]]
+            del placed["centers"]
+            return rr.Capsules3D(radii=[size[0]], lengths=[2 * size[1]], **placed)
+        case _:
+            half = [x or _PLANE_SIZE / 2 for x in size[:2]]
+            return rr.Boxes3D(half_sizes=[[*half, _PLANE_THICKNESS / 2]], **placed)

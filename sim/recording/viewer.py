@@ -1,0 +1,111 @@
+"""Opens recordings: in the viewer, or without a screen as a picture at a moment."""
+
+from __future__ import annotations
+
+import contextlib
+import socket
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Iterator
+from pathlib import Path
+
+from rerun.experimental import ViewerClient
+
+from sim.recording.blueprint import TIMELINE
+from synthesis import FulcrumError, InvalidInputError
+
+_PACKAGES = "mesa-vulkan-drivers libvulkan1 libegl1 libegl-mesa0 libgl1-mesa-dri"
+_SIZE = "1920x1080"
+_LOADING_S = 60.0
+_POLL_S = 0.2
+# A view that has just got its data needs some frames until textures and legends stand.
+_SETTLING_S = 1.0
+
+
+class ViewerError(FulcrumError):
+    """The viewer cannot show the recording on this machine."""
+
+
+def recording_file(run: Path) -> Path:
+    """The recording of a run, given its folder or the file itself.
+
+    Raises:
+        InvalidInputError: There is none.
+    """
+    path = run / "run.rrd" if run.is_dir() else run
+    if path.suffix != ".rrd" or not path.is_file():
+        raise InvalidInputError(
+            "recording", str(run), "a folder that `fulcrum run` wrote, or an .rrd file"
+        )
+    return path
+
+
+def view(run: Path) -> None:
+    """Opens a recording in the Rerun viewer; returns when the viewer is closed."""
+    command = [sys.executable, "-m", "rerun", str(recording_file(run))]
+    if subprocess.run(command, check=False).returncode != 0:
+        raise ViewerError("view: the Rerun viewer could not open a window on this machine.")
+
+
+def screenshot(run: Path, at_s: float, picture: Path) -> None:
+    """Writes a picture (PNG) of a recording as it opens, at a moment, without a screen.
+
+    Raises:
+        InvalidInputError: There is no such recording, or the moment lies outside it.
+        ViewerError: This machine cannot draw.
+    """
+    path = recording_file(run)
+    with _headless_viewer() as client:
+        client.open(str(path.resolve()))
+        start, end = _time_range(client)
+        if not start <= at_s <= end:
+            raise InvalidInputError("--at", f"{at_s:g} s", f"{start:g} to {end:.3f} s")
+        client.set_time(TIMELINE, duration=at_s, play_state="paused")
+        time.sleep(_SETTLING_S)
+        picture.write_bytes(client.take_screenshot())
+
+
+@contextlib.contextmanager
+def _headless_viewer() -> Iterator[ViewerClient]:
+    """A viewer process without a window; its log is dropped."""
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        port = probe.getsockname()[1]
+    command = [sys.executable, "-m", "rerun", "--headless", "--port", str(port)]
+    with tempfile.TemporaryFile() as log:
+        process = subprocess.Popen([*command, "--window-size", _SIZE], stdout=log, stderr=log)
+        try:
+            yield _connect(process, f"rerun+http://127.0.0.1:{port}/proxy")
+        finally:
+            process.terminate()
+            process.wait()
+
+
+def _connect(process: subprocess.Popen[bytes], url: str) -> ViewerClient:
+    deadline = time.monotonic() + _LOADING_S
+    while process.poll() is None and time.monotonic() < deadline:
+        # The client raises bare RuntimeErrors while the viewer is not up.
+        with contextlib.suppress(RuntimeError, ConnectionError):
+            client = ViewerClient.connect(url)
+            client.get_state()
+            return client
+        time.sleep(_POLL_S)
+    raise ViewerError(
+        "screenshot: the headless viewer did not start; it needs a Vulkan driver "
+        f"(Debian: apt-get install {_PACKAGES})."
+    )
+
+
+def _time_range(client: ViewerClient) -> tuple[float, float]:
+    """First and last moment [s] of the recording, once it is loaded."""
+    deadline = time.monotonic() + _LOADING_S
+    while time.monotonic() < deadline:
+        state = client.get_state()
+        for recording in state.recordings:
+            for timeline in recording.timelines:
+                if timeline.name == TIMELINE and timeline.end is not None and not state.loading:
+                    return 1e-9 * timeline.start, 1e-9 * timeline.end
+        time.sleep(_POLL_S)
+    raise ViewerError(f"screenshot: the recording was not loaded within {_LOADING_S:g} s.")

@@ -1,0 +1,158 @@
+"""The controller's belief about the robot: a Pinocchio model of its arms, hands and limits.
+
+The model is read off the nominal scene, so that hands, locked joints and the robot's place need no
+second description; that it is the official robot is tested against the official URDF.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import mujoco
+import numpy as np
+import pinocchio as pin
+
+from assets import velocity_limits
+from sim.scenario import Scenario
+from sim.scene import compose, tip_site
+from synthesis import Joints
+from synthesis.contact import Array
+
+
+class RobotModel:
+    """Kinematics, gravity and limits of the driven joints, in the order of the scene's motors.
+
+    Attributes:
+        joints: Names of the l driven joints.
+        q_min, q_max: Joint ranges [rad or m], (l,).
+        qd_max: Speed limits [rad/s or m/s], (l,).
+        tau_min, tau_max: Torque limits [N·m or N], (l,).
+        damping: Viscous joint friction [N·m·s/rad], (l,).
+    """
+
+    def __init__(self, scenario: Scenario) -> None:
+        scene = compose(scenario).compile()
+        drives = [scene.actuator(i) for i in range(scene.nu)]
+        indices = [int(drive.trnid[0]) for drive in drives]
+        self.joints = tuple(scene.joint(i).name for i in indices)
+        self.q_min, self.q_max = scene.jnt_range[indices].T.copy()
+        speeds = velocity_limits(scene)
+        self.qd_max = np.array([speeds[name] for name in self.joints])
+        self.tau_min, self.tau_max = np.array([drive.ctrlrange for drive in drives]).T.copy()
+        self.damping = scene.dof_damping[scene.jnt_dofadr[indices]].copy()
+
+        self._model = pinocchio_model(scene)
+        self._data = self._model.createData()
+        # Pinocchio may order joints otherwise; every vector here is in the order of the motors.
+        self._order = np.array(
+            [self._model.joints[self._model.getJointId(name)].idx_v for name in self.joints]
+        )
+        self._q = np.zeros(self._model.nq)
+        self._tips = [self._frame(tip_site(hand)) for hand in scenario.hands]
+
+    def _frame(self, name: str) -> int:
+        if not self._model.existFrame(name):
+            frames = ", ".join(frame.name for frame in self._model.frames)
+            raise ValueError(f"frame: got {name!r}; valid is one of {frames}.")
+        return int(self._model.getFrameId(name))
+
+    def update(self, q: Array) -> None:
+        """Takes over joint angles [rad or m], (l,), for all quantities asked for next."""
+        self._q[self._order] = q
+        pin.computeJointJacobians(self._model, self._data, self._q)
+        pin.updateFramePlacements(self._model, self._data)
+
+    def gravity(self) -> Array:
+        """Torque that holds the robot up against gravity [N·m or N], (l,)."""
+        g = pin.computeGeneralizedGravity(self._model, self._data, self._q)
+        return np.asarray(g)[self._order]
+
+    def mass_matrix(self) -> Array:
+        """Joint-space inertia [kg m^2 or kg], (l, l)."""
+        M = np.triu(pin.crba(self._model, self._data, self._q))
+        M = M + np.triu(M, 1).T
+        return M[np.ix_(self._order, self._order)]
+
+    def contact_jacobians(self, p_WC: Array, R_WC: Array) -> Array:
+        """Jacobians of the hands' points at the contacts, in contact axes.
+
+        Args:
+            p_WC: Contact points in the world [m], (n, 3).
+            R_WC: Contact axes in the world, (n, 3, 3).
+
+        Returns:
+            (n, 6, l): twist, linear part first, of the point of each hand that is at its contact.
+        """
+        J_WE = np.empty((len(self._tips), 6, len(self.joints)))
+        p_WE = np.empty((len(self._tips), 3))
+        for i, tip in enumerate(self._tips):
+            J_WE[i] = pin.getFrameJacobian(
+                self._model, self._data, tip, pin.ReferenceFrame.LOCAL_WORLD_ALIGNED
+            )[:, self._order]
+            p_WE[i] = self._data.oMf[tip].translation
+        linear, angular = J_WE[:, :3], J_WE[:, 3:]
+        offset = (p_WC - p_WE)[:, :, None]
+        R_CW = R_WC.transpose(0, 2, 1)
+        linear = linear + np.cross(angular, offset, axis=1)
+        return np.concatenate([R_CW @ linear, R_CW @ angular], axis=1)
+
+    def statics(self, p_WC: Array, R_WC: Array) -> Joints:
+        """The joints' part of the synthesis problem at the last updated angles."""
+        return Joints(
+            names=self.joints,
+            J_C=self.contact_jacobians(p_WC, R_WC),
+            tau_g=self.gravity(),
+            tau_min=self.tau_min,
+            tau_max=self.tau_max,
+        )
+
+
+def pinocchio_model(scene: mujoco.MjModel) -> pin.Model:
+    """Pinocchio model of all bodies of a compiled scene that hang on hinges and slides.
+
+    Bodies with a free joint (the object) are left out. Sites become frames of their names.
+    """
+    model = pin.Model()
+    model.gravity.linear = scene.opt.gravity
+    joint_of = {0: 0}
+    X_JB = {0: pin.SE3.Identity()}
+    for body in range(1, scene.nbody):
+        parent = int(scene.body_parentid[body])
+        first, count = int(scene.body_jntadr[body]), int(scene.body_jntnum[body])
+        own = range(first, first + count)
+        free = mujoco.mjtJoint.mjJNT_FREE
+        if parent not in joint_of or any(scene.jnt_type[j] == free for j in own):
+            continue
+        joint = joint_of[parent]
+        placement = X_JB[parent] * _pose(scene.body_pos[body], scene.body_quat[body])
+        for j in own:
+            anchor = pin.SE3(np.eye(3), scene.jnt_pos[j])
+            hinge = scene.jnt_type[j] == mujoco.mjtJoint.mjJNT_HINGE
+            kind = pin.JointModelRevoluteUnaligned if hinge else pin.JointModelPrismaticUnaligned
+            name = scene.joint(j).name
+            joint = model.addJoint(joint, kind(scene.jnt_axis[j]), placement * anchor, name)
+            placement = anchor.inverse()
+        joint_of[body], X_JB[body] = joint, placement
+        model.appendBodyToJoint(
+            joint,
+            pin.Inertia(
+                float(scene.body_mass[body]), np.zeros(3), np.diag(scene.body_inertia[body])
+            ),
+            placement * _pose(scene.body_ipos[body], scene.body_iquat[body]),
+        )
+        _add_frame(model, joint, placement, scene.body(body).name)
+    for site in range(scene.nsite):
+        body = int(scene.site_bodyid[site])
+        if body in joint_of:
+            placement = X_JB[body] * _pose(scene.site_pos[site], scene.site_quat[site])
+            _add_frame(model, joint_of[body], placement, scene.site(site).name)
+    return model
+
+
+def _add_frame(model: pin.Model, joint: int, placement: pin.SE3, name: str) -> None:
+    model.addFrame(pin.Frame(name, joint, placement, pin.FrameType.OP_FRAME))
+
+
+def _pose(position: Sequence[float] | Array, quaternion_wxyz: Sequence[float] | Array) -> pin.SE3:
+    w, x, y, z = quaternion_wxyz
+    return pin.SE3(pin.Quaternion(w, x, y, z).normalized().matrix(), np.asarray(position, float))

@@ -1,0 +1,185 @@
+"""One run of a scenario into a folder: recording, resolved configuration, report."""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+import math
+import signal
+import time
+from collections.abc import Callable
+from importlib.metadata import version
+from pathlib import Path
+from types import FrameType
+from typing import Any
+
+from dm_control.rl.control import PhysicsError
+
+from sim.loop import ClosedLoop
+from sim.monitor import ContactHistory, Monitor
+from sim.recording import Recorder
+from sim.report import Judge, Report, RunInfo
+from sim.scenario import Scenario
+from sim.settings import Control
+from sim.trace import Trace
+
+RECORDING, CONFIG, REPORT = "run.rrd", "config.json", "report.json"
+_PACKAGES = ("mujoco", "dm-control", "mink", "pin", "clarabel", "rerun-sdk", "numpy", "scipy")
+
+Progress = Callable[[int, int], None]
+
+
+@dataclasses.dataclass(frozen=True)
+class Request:
+    """What to run.
+
+    Attributes:
+        scenario: The scene.
+        controller: Name of the controller, for the report.
+        control: The controller's settings.
+        seed: Draws the small deviations of the start posture.
+        out: Folder for recording, configuration and report; None writes nothing.
+        live: Whether to open a viewer that follows the run.
+    """
+
+    scenario: Scenario
+    controller: str
+    control: Control
+    seed: int = 0
+    out: Path | None = None
+    live: bool = False
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class Result:
+    """What a run gave: the verdict and all that it rests on."""
+
+    report: Report
+    trace: Trace
+    history: ContactHistory
+
+
+def execute(request: Request, progress: Progress | None = None) -> Result:
+    """Runs to the end, or until interrupted (SIGINT, SIGTERM), and leaves a complete record.
+
+    Args:
+        request: What to run.
+        progress: Called with steps done and steps in total after every block.
+
+    Raises:
+        PathError: The arms cannot follow the path; nothing has moved.
+        InvalidInputError: The scenario contradicts itself.
+    """
+    scenario, out = request.scenario, request.out
+    loop = ClosedLoop(scenario, request.control, seed=request.seed)
+    monitor = Monitor(scenario)
+    robot = loop.robot
+    judge = Judge(scenario, robot.joints, robot.tau_min, robot.tau_max)
+    recorder = None
+    if out is not None:
+        out.mkdir(parents=True, exist_ok=True)
+        config = resolved_config(request)
+        _write_json(out / CONFIG, config)
+        limits = robot.tau_min, robot.tau_max
+        recorder = Recorder(
+            out / RECORDING, scenario, config, robot.joints, *limits, live=request.live
+        )
+    histories: list[ContactHistory] = []
+    error: str | None = None
+    started = time.perf_counter()
+    with _StopSignal() as stop:
+        try:
+            for block in loop.run():
+                histories.append(monitor.update(block))
+                if recorder is not None:
+                    recorder.write(block, histories[-1])
+                if progress is not None:
+                    progress(loop.steps, loop.total_steps)
+                if stop.requested:
+                    break
+        except PhysicsError as diverged:
+            error = f"The simulation diverged at {loop.steps} steps: {diverged}."
+    info = RunInfo(
+        controller=request.controller,
+        objective=request.control.objective,
+        seed=request.seed,
+        wall_s=time.perf_counter() - started,
+        interrupted=stop.requested,
+        error=error,
+        recording=None if out is None else RECORDING,
+    )
+    history = ContactHistory.concatenate(histories)
+    trace = loop.trace.rows(0, len(history.kept))
+    report = judge.report(info, trace, history)
+    if out is not None and recorder is not None:
+        _write_json(out / REPORT, dataclasses.asdict(report))
+        recorder.close(markdown(report))
+    return Result(report, trace, history)
+
+
+class _StopSignal:
+    """Turns Ctrl-C and SIGTERM into a request to stop after the present block."""
+
+    def __init__(self) -> None:
+        self.requested = False
+        self._previous: dict[signal.Signals, Any] = {}
+
+    def __enter__(self) -> _StopSignal:
+        for number in (signal.SIGINT, signal.SIGTERM):
+            self._previous[number] = signal.signal(number, self._request)
+        return self
+
+    def _request(self, number: int, frame: FrameType | None) -> None:
+        self.requested = True
+
+    def __exit__(self, *_: object) -> None:
+        for number, handler in self._previous.items():
+            signal.signal(number, handler)
+
+
+def resolved_config(request: Request) -> dict[str, Any]:
+    """Everything that determines the run, for JSON; infinite limits become null."""
+    return _finite(
+        {
+            "controller": request.controller,
+            "seed": request.seed,
+            "control": dataclasses.asdict(request.control),
+            "scenario": dataclasses.asdict(request.scenario),
+            "versions": {name: version(name) for name in _PACKAGES},
+        }
+    )
+
+
+def _finite(value: Any) -> Any:
+    if isinstance(value, dict):
+        return {key: _finite(item) for key, item in value.items()}
+    if isinstance(value, (list, tuple)):
+        return [_finite(item) for item in value]
+    return None if isinstance(value, float) and not math.isfinite(value) else value
+
+
+def _write_json(path: Path, content: dict[str, Any]) -> None:
+    path.write_text(json.dumps(content, indent=2, allow_nan=False) + "\n")
+
+
+def markdown(report: Report) -> str:
+    """The report as Markdown, for people who open the recording."""
+    lines = [f"# {report.scenario}: {report.verdict.upper()}", ""]
+    lines += [f"- {failure}" for failure in report.failures]
+    tilt, torque = report.tilt, report.torque
+    lines += [
+        "",
+        f"Controller {report.controller}, objective {report.objective}, seed {report.seed}.",
+        f"Tilt {tilt.final_deg:.2f} of {tilt.target_deg:g} deg, error at most "
+        f"{tilt.max_error_deg:.3f} deg; torque at most {100 * torque.max_utilisation:.0f} % of "
+        f"its limit ({torque.joint}).",
+        "",
+        "| contact | kept | slip mm | slide mm | spin deg | utilisation | force error N |",
+        "|---|---|---|---|---|---|---|",
+    ]
+    lines += [
+        f"| {name} | {100 * c.kept_fraction:.1f} % | {c.slip_mm:.3f} | {c.slide_mm:.3f} | "
+        f"{c.spin_deg:.3f} | {c.max_utilisation:.2f} | {c.force_error_rms_n:.2f} |"
+        for name, c in report.contacts.items()
+    ]
+    return "\n".join(lines)

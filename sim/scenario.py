@@ -1,0 +1,203 @@
+"""What a scenario is: frozen data about object, contacts, robot, path and how it is run."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+from sim.settings import Control, Physics, Timing, Tolerances
+from synthesis import InvalidInputError
+
+GRAVITY = 9.81  # [m/s^2]
+
+Vector = tuple[float, float, float]
+Quaternion = tuple[float, float, float, float]
+
+
+@dataclass(frozen=True)
+class Pose:
+    """A frame's position [m] and orientation (quaternion wxyz) in its parent frame."""
+
+    position: Vector = (0.0, 0.0, 0.0)
+    quaternion: Quaternion = (1.0, 0.0, 0.0, 0.0)
+
+
+@dataclass(frozen=True)
+class Geom:
+    """A primitive in MuJoCo's terms.
+
+    Attributes:
+        name: Unique in the scene.
+        kind: Geom type as MuJoCo names it: plane, sphere, capsule, ellipsoid, cylinder, box.
+        size: Sizes as MuJoCo reads them (half extents; radius, half length) [m].
+        pose: Pose in the frame of the owner (object or world).
+        rgba: Colour and opacity, each 0 to 1.
+    """
+
+    name: str
+    kind: str
+    size: tuple[float, ...]
+    pose: Pose = Pose()
+    rgba: tuple[float, float, float, float] = (0.6, 0.6, 0.6, 1.0)
+
+
+@dataclass(frozen=True)
+class Object:
+    """The thing that is tilted.
+
+    Attributes:
+        name: What people call it.
+        mass: [kg].
+        inertia: Principal moments about the centre of mass, along the object's axes [kg m^2].
+        center_of_mass: In the object frame [m].
+        geoms: Its shape; contacts refer to these by name.
+    """
+
+    name: str
+    mass: float
+    inertia: Vector
+    geoms: tuple[Geom, ...]
+    center_of_mass: Vector = (0.0, 0.0, 0.0)
+
+
+@dataclass(frozen=True)
+class Friction:
+    """Coulomb friction with the ellipticities of the paper's (1) and (2).
+
+    Attributes:
+        mu: Coefficient [-].
+        e_n: Torsional over tangential friction [m]; None for a contact that carries no torsion.
+    """
+
+    mu: float
+    e_n: float | None = None
+
+
+@dataclass(frozen=True)
+class Hand:
+    """A robot's end effector and the place where it holds the object.
+
+    The contact axes are n = ``normal_O``, t = ``tangent_O`` and o = n x t; the hand's tip axes (x,
+    y, z) coincide with (t, o, n), so that the hand turns with the object.
+
+    Attributes:
+        name: Name of the contact and prefix of the hand's parts.
+        mount: Body of the robot that carries the hand.
+        model: Asset with a body ``pad`` that has a spherical geom ``tip`` and a site
+            ``tip_center``.
+        geom: The object's geom that is touched.
+        p_OC_O: Contact point in the object frame [m].
+        normal_O: Inward normal in the object's axes.
+        tangent_O: First tangent in the object's axes, perpendicular to the normal.
+        friction: Between tip and object.
+        f_n_max: Largest allowed normal force [N].
+    """
+
+    name: str
+    mount: str
+    model: str
+    geom: str
+    p_OC_O: Vector
+    normal_O: Vector
+    tangent_O: Vector
+    friction: Friction
+    f_n_max: float = math.inf
+
+
+@dataclass(frozen=True)
+class Support:
+    """A point of the object that stays on the environment while the object pivots.
+
+    Attributes:
+        name: Name of the contact.
+        geom: The object's geom that touches.
+        surface: Name of the environment's geom that is touched.
+        p_OP_O: The point in the object frame [m].
+        normal_W: Surface normal in world axes, into the object.
+        tangent_W: First tangent in world axes.
+        friction: Between object and surface.
+    """
+
+    name: str
+    geom: str
+    surface: str
+    p_OP_O: Vector
+    normal_W: Vector
+    tangent_W: Vector
+    friction: Friction
+
+
+@dataclass(frozen=True)
+class Robot:
+    """The robot, its place and its start posture.
+
+    Attributes:
+        model: Asset (MJCF); joint speed limits are the joints' ``user`` number.
+        description: The URDF in example-robot-data whose meshes recordings show; None for none.
+        base: Pose of the model's root in the world.
+        posture: Start angle [rad or m] of every joint that is driven, from which inverse
+            kinematics seeks; the other joints are locked at 0.
+        start_deviation: Standard deviation of the start posture from the planned one [rad or m],
+            drawn by the run's seed.
+    """
+
+    model: str
+    posture: dict[str, float]
+    description: str | None = None
+    base: Pose = Pose()
+    start_deviation: float = 1e-4
+
+
+@dataclass(frozen=True)
+class Pivot:
+    """The path of the object: a screw motion about an axis fixed in the world.
+
+    Attributes:
+        start: Pose of the object at tilt 0.
+        point_W: A point on the axis [m].
+        axis_W: Direction of the axis; the tilt is positive by the right-hand rule.
+        angle_deg: Tilt at the end [deg].
+        pitch: Advance along the axis per radian [m].
+    """
+
+    start: Pose
+    point_W: Vector
+    axis_W: Vector
+    angle_deg: float = 90.0
+    pitch: float = 0.0
+
+
+@dataclass(frozen=True)
+class Scenario:
+    """Everything that a run needs to know; nothing else may distinguish one scene from another."""
+
+    name: str
+    summary: str
+    object: Object
+    environment: tuple[Geom, ...]
+    hands: tuple[Hand, ...]
+    supports: tuple[Support, ...]
+    robot: Robot
+    path: Pivot
+    timing: Timing = Timing()
+    control: Control = Control()
+    physics: Physics = Physics()
+    tolerances: Tolerances = Tolerances()
+
+    def __post_init__(self) -> None:
+        geoms = [g.name for g in self.object.geoms]
+        touched = [(c.name, c.geom) for c in self.hands] + [(c.name, c.geom) for c in self.supports]
+        for name, geom in touched:
+            if geom not in geoms:
+                raise InvalidInputError(f"{name}.geom", geom, f"one of {', '.join(geoms)}")
+        surfaces = [g.name for g in self.environment]
+        for support in self.supports:
+            if support.surface not in surfaces:
+                raise InvalidInputError(
+                    f"{support.name}.surface", support.surface, f"one of {', '.join(surfaces)}"
+                )
+
+    @property
+    def contact_names(self) -> tuple[str, ...]:
+        """Names of all contacts, hands first: the order of every per-contact array."""
+        return (*(hand.name for hand in self.hands), *(support.name for support in self.supports))

@@ -1,0 +1,180 @@
+"""Composes a MuJoCo scene from a scenario's data: robot, hands, object, environment, contacts."""
+
+from __future__ import annotations
+
+from enum import StrEnum
+
+import mujoco
+import numpy as np
+
+from assets import asset_path
+from sim.scenario import GRAVITY, Friction, Geom, Hand, Scenario
+from synthesis import InvalidInputError
+
+# Solver tolerance of both the main and the noslip solver; tight, for runs are compared bit by bit.
+_SOLVER_TOLERANCE = 1e-10
+
+_GEOM_TYPES = {
+    kind: getattr(mujoco.mjtGeom, f"mjGEOM_{kind.upper()}")
+    for kind in ("plane", "sphere", "capsule", "ellipsoid", "cylinder", "box")
+}
+
+
+class ObjectMotion(StrEnum):
+    """Whether physics moves the object, or whoever poses it (inverse kinematics)."""
+
+    FREE = "free"
+    POSED = "posed"
+
+
+def compose(scenario: Scenario, motion: ObjectMotion = ObjectMotion.FREE) -> mujoco.MjSpec:
+    """The scene as an editable specification.
+
+    Raises:
+        InvalidInputError: The scenario names a joint, mount or geom type that does not exist.
+    """
+    spec = _robot_with_hands(scenario)
+    spec.modelname = scenario.name
+    _set_options(spec, scenario)
+    for geom in scenario.environment:
+        _add_geom(spec.worldbody, geom)
+    _add_object(spec, scenario, motion)
+    if motion is ObjectMotion.FREE:
+        _add_pairs(spec, scenario)
+    _add_view(spec, scenario)
+    return spec
+
+
+def hand_body(hand: Hand) -> str:
+    """Name of the body of a hand."""
+    return f"{hand.name}_pad"
+
+
+def tip_geom(hand: Hand) -> str:
+    """Name of the geom with which a hand touches."""
+    return f"{hand.name}_tip"
+
+
+def tip_site(hand: Hand) -> str:
+    """Name of the site at the centre of a hand's tip."""
+    return f"{hand.name}_tip_center"
+
+
+def _set_options(spec: mujoco.MjSpec, scenario: Scenario) -> None:
+    physics, option = scenario.physics, spec.option
+    option.timestep = physics.timestep
+    option.gravity = [0.0, 0.0, -GRAVITY]
+    option.cone = mujoco.mjtCone.mjCONE_ELLIPTIC
+    option.integrator = mujoco.mjtIntegrator.mjINT_IMPLICITFAST
+    option.jacobian = mujoco.mjtJacobian.mjJAC_DENSE
+    option.impratio = physics.impratio
+    option.noslip_iterations = physics.noslip_iterations
+    option.tolerance = option.noslip_tolerance = _SOLVER_TOLERANCE
+
+
+def _robot_with_hands(scenario: Scenario) -> mujoco.MjSpec:
+    robot = mujoco.MjSpec.from_file(str(asset_path(scenario.robot.model)))
+    known = [joint.name for joint in robot.joints]
+    for name in scenario.robot.posture:
+        if name not in known:
+            raise InvalidInputError("robot.posture", name, f"one of {', '.join(known)}")
+    for hand in scenario.hands:
+        mount = robot.body(hand.mount)
+        if mount is None:
+            bodies = ", ".join(body.name for body in robot.bodies)
+            raise InvalidInputError(f"{hand.name}.mount", hand.mount, f"one of {bodies}")
+        model = mujoco.MjSpec.from_file(str(asset_path(hand.model)))
+        mount.add_frame().attach_body(model.body("pad"), f"{hand.name}_", "")
+    for actuator in list(robot.actuators):
+        if actuator.target not in scenario.robot.posture:
+            robot.delete(actuator)
+    for joint in list(robot.joints):
+        if joint.name not in scenario.robot.posture:
+            robot.delete(joint)
+    base = scenario.robot.base
+    for root in robot.worldbody.bodies:
+        position, quaternion = np.zeros(3), np.zeros(4)
+        mujoco.mju_mulPose(
+            position, quaternion, base.position, base.quaternion, root.pos, root.quat
+        )
+        root.pos, root.quat = position, quaternion
+    return robot
+
+
+def _add_geom(body: mujoco.MjsBody, geom: Geom) -> None:
+    if geom.kind not in _GEOM_TYPES:
+        raise InvalidInputError(f"{geom.name}.kind", geom.kind, f"one of {', '.join(_GEOM_TYPES)}")
+    body.add_geom(
+        name=geom.name,
+        type=_GEOM_TYPES[geom.kind],
+        size=[*geom.size, 0.0, 0.0][:3],
+        pos=geom.pose.position,
+        quat=geom.pose.quaternion,
+        rgba=geom.rgba,
+        mass=0.0,
+        contype=0,
+        conaffinity=0,
+    )
+
+
+def _add_object(spec: mujoco.MjSpec, scenario: Scenario, motion: ObjectMotion) -> None:
+    thing, start = scenario.object, scenario.path.start
+    body = spec.worldbody.add_body(
+        name=thing.name,
+        pos=start.position,
+        quat=start.quaternion,
+        mass=thing.mass,
+        ipos=thing.center_of_mass,
+        inertia=thing.inertia,
+        explicitinertial=True,
+        mocap=motion is ObjectMotion.POSED,
+    )
+    if motion is ObjectMotion.FREE:
+        body.add_freejoint(name=thing.name)
+    for geom in thing.geoms:
+        _add_geom(body, geom)
+
+
+def _add_pairs(spec: mujoco.MjSpec, scenario: Scenario) -> None:
+    """Explicit pairs: without them friction is the larger of the two geoms'."""
+    for hand in scenario.hands:
+        _add_pair(spec, scenario, tip_geom(hand), hand.geom, hand.friction)
+    frictions: dict[tuple[str, str], Friction] = {}
+    for support in scenario.supports:
+        key = (support.surface, support.geom)
+        if frictions.setdefault(key, support.friction) != support.friction:
+            raise InvalidInputError(
+                f"{support.name}.friction",
+                support.friction,
+                f"{frictions[key]}, as at other contacts of {support.geom} on {support.surface}",
+            )
+    for (surface, geom), friction in frictions.items():
+        _add_pair(spec, scenario, surface, geom, friction)
+
+
+def _add_pair(
+    spec: mujoco.MjSpec, scenario: Scenario, first: str, second: str, friction: Friction
+) -> None:
+    """An elliptic cone with condim 4 is exactly SFCE, (2) of the paper; with condim 3 PCWF, (1)."""
+    physics = scenario.physics
+    torsion = 0.0 if friction.e_n is None else friction.mu * friction.e_n
+    spec.add_pair(
+        name=f"{first}-{second}",
+        geomname1=first,
+        geomname2=second,
+        condim=3 if friction.e_n is None else 4,
+        friction=[friction.mu, friction.mu, torsion, 0.0, 0.0],
+        solref=physics.solref,
+        solreffriction=physics.solref_friction,
+        solimp=[*physics.solimp, 0.5, 2.0],
+    )
+
+
+def _add_view(spec: mujoco.MjSpec, scenario: Scenario) -> None:
+    """Lights and a camera on the scene for MuJoCo's own viewer."""
+    spec.worldbody.add_light(pos=[0.0, -1.5, 2.5], dir=[0.2, 0.6, -1.0])
+    spec.worldbody.add_light(pos=[1.5, 1.5, 2.5], dir=[-0.4, -0.5, -1.0])
+    spec.stat.center = scenario.path.point_W
+    spec.stat.extent = 1.0
+    spec.visual.headlight.ambient = [0.4, 0.4, 0.4]
+    spec.visual.global_.offwidth, spec.visual.global_.offheight = 1280, 960

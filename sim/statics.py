@@ -1,0 +1,42 @@
+"""From a measured state to the contact force synthesis problem, through the controller's belief."""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from sim.contacts import ContactFrames, contacts
+from sim.plant import Measurement
+from sim.robot import RobotModel
+from sim.scenario import GRAVITY, Scenario
+from sim.settings import Control
+from synthesis import Problem
+
+
+class Statics:
+    """The scenario's nominal object, contacts and robot as problems of the form (17)."""
+
+    def __init__(self, scenario: Scenario, control: Control, robot: RobotModel) -> None:
+        self._robot = robot
+        self._objective = control.objective
+        self._contacts = contacts(scenario, control)
+        self._frames = ContactFrames(scenario)
+        self._hands = len(scenario.hands)
+        self._weight_W = np.array([0.0, 0.0, -scenario.object.mass * GRAVITY])
+        self._center_O = np.asarray(scenario.object.center_of_mass)
+
+    def problem(self, measurement: Measurement) -> Problem:
+        """The problem at the measured pose of the object and angles of the robot."""
+        R_WO = Rotation.from_quat(measurement.quat_WO, scalar_first=True).as_matrix()
+        R_OC = self._frames.in_object(R_WO)
+        p_WC = self._frames.points(R_WO, measurement.p_WO)
+        weight_O = R_WO.T @ self._weight_W
+        self._robot.update(measurement.q)
+        return Problem(
+            contacts=self._contacts,
+            R_OC=R_OC,
+            p_OC_O=self._frames.p_OC_O,
+            w_ext_O=np.concatenate([weight_O, np.cross(self._center_O, weight_O)]),
+            joints=self._robot.statics(p_WC[: self._hands], R_WO @ R_OC[: self._hands]),
+            objective=self._objective,
+        )

@@ -1,0 +1,49 @@
+"""The one error tree: every message names the culprit, what was given and what is valid."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from synthesis.solution import Certificate
+
+
+class FulcrumError(Exception):
+    """Root of all errors that fulcrum raises on purpose."""
+
+
+class InvalidInputError(FulcrumError, ValueError):
+    """A field of a problem, scenario or configuration is non-finite, mis-shaped or senseless."""
+
+    def __init__(self, field: str, given: object, valid: str) -> None:
+        self.field = field
+        super().__init__(f"{field}: got {given}; valid is {valid}.")
+
+
+class InfeasibleError(FulcrumError):
+    """No contact forces satisfy all constraints of (17); carries the Farkas certificate."""
+
+    def __init__(self, certificate: Certificate) -> None:
+        self.certificate = certificate
+        super().__init__(
+            "no contact forces keep the object in equilibrium within all limits; "
+            f"most binding: {', '.join(certificate.heaviest(3))}."
+        )
+
+
+class UnboundedError(FulcrumError):
+    """The objective improves without limit, so that no optimal solution exists."""
+
+    def __init__(self, objective: str) -> None:
+        super().__init__(
+            f"objective {objective} improves without limit; "
+            "give the hand contacts an f_n_max or the joints torque limits."
+        )
+
+
+class SolverError(FulcrumError):
+    """The solver stopped without a solution and without a certificate."""
+
+    def __init__(self, status: str) -> None:
+        self.status = status
+        super().__init__(f"the conic solver stopped with status {status}; valid is Solved.")

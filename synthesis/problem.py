@@ -1,0 +1,201 @@
+"""The contact force synthesis problem, (17) of the paper, as checked and frozen data."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import StrEnum
+from functools import cached_property
+
+import numpy as np
+
+from synthesis.contact import Array, Contact, ContactModel, Role, grasp_maps
+from synthesis.errors import InvalidInputError
+
+# Rotation matrices come from integrated quaternions: 1e-6 passes those, and nothing mis-scaled.
+_ROTATION_TOLERANCE = 1e-6
+
+
+class Objective(StrEnum):
+    """What is minimised: the paper's four objectives, and two that limits and friction call for."""
+
+    MAX_NORMAL_FORCE = "max-normal-force"
+    NORM_NORMAL_FORCE = "norm-normal-force"
+    MAX_TORQUE = "max-torque"
+    NORM_TORQUE = "norm-torque"
+    MAX_TORQUE_UTILISATION = "max-torque-utilisation"
+    FRICTION_MARGIN = "friction-margin"
+
+    @property
+    def needs_joints(self) -> bool:
+        """Whether the objective is a function of the joint torques."""
+        return self in _TORQUE_OBJECTIVES
+
+
+_TORQUE_OBJECTIVES = (
+    Objective.MAX_TORQUE,
+    Objective.NORM_TORQUE,
+    Objective.MAX_TORQUE_UTILISATION,
+)
+
+
+@dataclass(frozen=True, eq=False)
+class Joints:
+    r"""The joints that make the hand contact forces, (13) to (16) of the paper.
+
+    With :math:`f_C` the wrench on the object and :math:`\tau_g` the torque that holds the arm up
+    (the generalised gravity), statics is :math:`\tau = J^T f_C + \tau_g`; the paper's (13) is the
+    same with the signs of the torques flipped.
+
+    Attributes:
+        names: The l joints.
+        J_C: Contact Jacobians, (n, 6, l), one per hand contact in the problem's order: the twist of
+            the end effector's point at the contact in contact axes, linear part first. Joints
+            shared by several contacts (a wrist) have columns in each of them.
+        tau_g: Torque that balances gravity on the arm [N·m or N], (l,).
+        tau_min: Lower torque limits [N·m or N], (l,); may be -inf.
+        tau_max: Upper torque limits [N·m or N], (l,); may be inf.
+
+    Raises:
+        InvalidInputError: A field is non-finite, mis-shaped or contradictory.
+    """
+
+    names: tuple[str, ...]
+    J_C: Array
+    tau_g: Array
+    tau_min: Array
+    tau_max: Array
+
+    def __post_init__(self) -> None:
+        _check_names("joints.names", self.names)
+        joints = len(self.names)
+        if self.J_C.ndim != 3 or self.J_C.shape[1:] != (6, joints):
+            raise InvalidInputError("joints.J_C", f"shape {self.J_C.shape}", f"(n, 6, {joints})")
+        for field in ("tau_g", "tau_min", "tau_max"):
+            _check_shape(f"joints.{field}", getattr(self, field), (joints,))
+        for field in ("J_C", "tau_g"):
+            _check_finite(f"joints.{field}", getattr(self, field))
+        ordered = (
+            (self.tau_min <= self.tau_max) & (self.tau_min < np.inf) & (self.tau_max > -np.inf)
+        )
+        if not ordered.all():
+            worst = int(np.argmin(ordered))
+            raise InvalidInputError(
+                f"joints.tau_min[{self.names[worst]}]",
+                self.tau_min[worst],
+                f"below inf and no larger than tau_max = {self.tau_max[worst]} > -inf",
+            )
+
+
+@dataclass(frozen=True, eq=False)
+class Problem:
+    r"""Contact force synthesis for one pose of object and robot, (17) of the paper:
+
+    .. math::
+
+        \text{minimise}\quad   & \Phi(F_C, \tau) \\
+        \text{subject to}\quad & G_C F_C + G_E F_E + w_{ext} = 0          && (12) \\
+                               & \tau = J^T F_C + \tau_g                  && (15) \\
+                               & \tau_{min} \le \tau \le \tau_{max}       && (16) \\
+                               & F_{n,min} \le F_n \le F_{n,max}          && (7) \\
+                               & f_i \in \mathcal{K}_i                    && (5), (6)
+
+    Attributes:
+        contacts: The m contacts with their models and parameters.
+        R_OC: Contact axes (t, o, n) in the object's axes, n into the object, (m, 3, 3).
+        p_OC_O: Contact positions in the object frame [m], (m, 3).
+        w_ext_O: External wrench on the object, weight included, in the object frame [N, N·m], (6,).
+        joints: The joints behind the hand contacts; None leaves (15) and (16) out.
+        objective: Phi.
+
+    Raises:
+        InvalidInputError: A field is non-finite, mis-shaped or senseless.
+    """
+
+    contacts: tuple[Contact, ...]
+    R_OC: Array
+    p_OC_O: Array
+    w_ext_O: Array
+    joints: Joints | None = None
+    objective: Objective = Objective.MAX_NORMAL_FORCE
+
+    def __post_init__(self) -> None:
+        m = len(self.contacts)
+        _check_names("contacts", tuple(c.name for c in self.contacts))
+        _check_shape("R_OC", self.R_OC, (m, 3, 3))
+        _check_shape("p_OC_O", self.p_OC_O, (m, 3))
+        _check_shape("w_ext_O", self.w_ext_O, (6,))
+        for field in ("R_OC", "p_OC_O", "w_ext_O"):
+            _check_finite(field, getattr(self, field))
+        self._check_rotations()
+        if not self.hands and self.objective is not Objective.FRICTION_MARGIN:
+            raise InvalidInputError("contacts", "no hand", f"a hand, as {self.objective} asks")
+        frictionless = all(c.model is ContactModel.FRICTIONLESS for c in self.contacts)
+        if frictionless and self.objective is Objective.FRICTION_MARGIN:
+            raise InvalidInputError(
+                "contacts", "no friction", f"friction, as {self.objective} asks"
+            )
+        if self.joints is None and self.objective.needs_joints:
+            raise InvalidInputError("joints", None, f"joints, as objective {self.objective} asks")
+        if self.joints is not None:
+            self._check_joints(self.joints)
+
+    def _check_rotations(self) -> None:
+        deviation = np.abs(self.R_OC @ self.R_OC.transpose(0, 2, 1) - np.eye(3)).max(axis=(1, 2))
+        proper = (deviation <= _ROTATION_TOLERANCE) & (np.linalg.det(self.R_OC) > 0.0)
+        if not proper.all():
+            worst = self.contacts[int(np.argmin(proper))].name
+            raise InvalidInputError(
+                f"R_OC[{worst}]", "a matrix that is no rotation", "orthonormal with determinant +1"
+            )
+
+    def _check_joints(self, joints: Joints) -> None:
+        if len(joints.J_C) != len(self.hands):
+            raise InvalidInputError(
+                "joints.J_C",
+                f"{len(joints.J_C)} Jacobians",
+                f"one for each of the {len(self.hands)} hand contacts",
+            )
+        if self.objective is Objective.MAX_TORQUE_UTILISATION:
+            usable = np.isfinite(joints.tau_min) & np.isfinite(joints.tau_max)
+            usable &= (joints.tau_min < 0.0) & (joints.tau_max > 0.0)
+            if not usable.all():
+                worst = int(np.argmin(usable))
+                raise InvalidInputError(
+                    f"joints.tau_min[{joints.names[worst]}], tau_max",
+                    (float(joints.tau_min[worst]), float(joints.tau_max[worst])),
+                    f"finite with tau_min < 0 < tau_max, as objective {self.objective} asks",
+                )
+
+    @cached_property
+    def hands(self) -> tuple[int, ...]:
+        """Indices of the hand contacts, in the order of the Jacobians."""
+        return tuple(i for i, c in enumerate(self.contacts) if c.role is Role.HAND)
+
+    @cached_property
+    def G(self) -> Array:
+        """Grasp maps of all contacts, (m, 6, 6)."""
+        return grasp_maps(self.R_OC, self.p_OC_O)
+
+    def torque(self, w_OC_C: Array) -> Array:
+        """Joint torques [N·m or N], (l,), that go with contact wrenches, (m, 6): (15)."""
+        if self.joints is None:
+            return np.zeros(0)
+        return np.einsum("nkl,nk->l", self.joints.J_C, w_OC_C[list(self.hands)]) + self.joints.tau_g
+
+
+def _check_names(field: str, names: tuple[str, ...]) -> None:
+    if not names:
+        raise InvalidInputError(field, "an empty set", "at least one")
+    repeated = sorted({name for name in names if names.count(name) > 1})
+    if repeated:
+        raise InvalidInputError(field, f"{', '.join(repeated)} more than once", "unique names")
+
+
+def _check_shape(field: str, array: Array, shape: tuple[int, ...]) -> None:
+    if np.shape(array) != shape:
+        raise InvalidInputError(field, f"shape {np.shape(array)}", f"shape {shape}")
+
+
+def _check_finite(field: str, array: Array) -> None:
+    if not np.isfinite(array).all():
+        raise InvalidInputError(field, "a value that is NaN or infinite", "finite numbers")
