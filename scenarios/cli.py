@@ -131,7 +131,7 @@ class Screenshot:
 
     def execute(self) -> int:
         """Does it; returns the exit code."""
-        from sim.recording.viewer import recording_file, screenshot
+        from sim.recording import recording_file, screenshot
 
         picture = self.out or recording_file(self.run).parent / f"screenshot-{self.at:g}.png"
         if not picture.parent.is_dir():
@@ -150,7 +150,7 @@ class View:
 
     def execute(self) -> int:
         """Does it; returns the exit code."""
-        from sim.recording.viewer import view
+        from sim.recording import view
 
         view(self.run)
         return PASSED
@@ -207,8 +207,8 @@ def _progress(name: str):  # type: ignore[no-untyped-def]
 
 
 def _print_report(report: Report, out: Path) -> None:
-    from rich.console import Console
     from rich.box import SIMPLE
+    from rich.console import Console
     from rich.markup import escape
     from rich.table import Table
 

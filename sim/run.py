@@ -17,7 +17,7 @@ from dm_control.rl.control import PhysicsError
 
 from sim.loop import ClosedLoop
 from sim.monitor import ContactHistory, Monitor
-from sim.recording import Recorder
+from sim.recording import Recorder, open_viewer
 from sim.report import Judge, Report, RunInfo
 from sim.scenario import Scenario
 from sim.settings import Control
@@ -39,7 +39,7 @@ class Request:
         control: The controller's settings.
         seed: Draws the small deviations of the start posture.
         out: Folder for recording, configuration and report; None writes nothing.
-        live: Whether to open a viewer that follows the run.
+        live: Whether to open a viewer that follows the run (with ``out`` only).
     """
 
     scenario: Scenario
@@ -77,12 +77,13 @@ def execute(request: Request, progress: Progress | None = None) -> Result:
     judge = Judge(scenario, robot.joints, robot.tau_min, robot.tau_max)
     recorder = None
     if out is not None:
+        viewer_url = open_viewer() if request.live else None
         out.mkdir(parents=True, exist_ok=True)
         config = resolved_config(request)
         _write_json(out / CONFIG, config)
         limits = robot.tau_min, robot.tau_max
         recorder = Recorder(
-            out / RECORDING, scenario, config, robot.joints, *limits, live=request.live
+            out / RECORDING, scenario, config, robot.joints, *limits, viewer_url=viewer_url
         )
     histories: list[ContactHistory] = []
     error: str | None = None

@@ -51,7 +51,7 @@ class Recorder:
         joints: tuple[str, ...],
         tau_min: Array,
         tau_max: Array,
-        live: bool = False,
+        viewer_url: str | None = None,
     ) -> None:
         """Opens the file and writes everything that does not change.
 
@@ -62,7 +62,7 @@ class Recorder:
             joints: Names of the l driven joints.
             tau_min: Torque limits [N·m or N], (l,).
             tau_max: Torque limits [N·m or N], (l,).
-            live: Whether to open a viewer that follows the run.
+            viewer_url: A viewer that follows the run.
         """
         self._scenario = scenario
         self._contacts = true_contacts(scenario)
@@ -71,9 +71,9 @@ class Recorder:
         # Viewers keep the first blueprint they see per application id.
         self._recording = rr.RecordingStream(f"fulcrum {scenario.name}")
         sinks: list[Any] = [rr.FileSink(path)]
-        if live:
-            rr.spawn(connect=False)
-            sinks.append(rr.GrpcSink())
+        self._streamed = viewer_url is not None
+        if viewer_url is not None:
+            sinks.append(rr.GrpcSink(viewer_url))
         layout = blueprint(scenario, np.asarray(scenario.path.point_W))
         self._recording.set_sinks(*sinks, default_blueprint=layout)
         self._scenery = Scenery(scenario, joints)
@@ -169,7 +169,11 @@ class Recorder:
     def close(self, verdict: str) -> None:
         """Writes the verdict, as Markdown, and completes the file."""
         self._log_text("verdict", verdict)
-        self._recording.flush()
+        try:
+            self._recording.flush()
+        except RuntimeError:  # somebody may close the viewer, but the file must be whole
+            if not self._streamed:
+                raise
         self._recording.disconnect()
 
 

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import contextlib
+import os
+import signal
 import socket
 import subprocess
 import sys
-import tempfile
 import time
 from collections.abc import Iterator
 from pathlib import Path
@@ -17,6 +18,8 @@ from sim.recording.blueprint import TIMELINE
 from synthesis import FulcrumError, InvalidInputError
 
 _PACKAGES = "mesa-vulkan-drivers libvulkan1 libegl1 libegl-mesa0 libgl1-mesa-dri"
+_NO_WINDOW = "the Rerun viewer could not open a window on this machine."
+_RERUN = (sys.executable, "-m", "rerun")
 _SIZE = "1920x1080"
 _LOADING_S = 60.0
 _POLL_S = 0.2
@@ -44,9 +47,21 @@ def recording_file(run: Path) -> Path:
 
 def view(run: Path) -> None:
     """Opens a recording in the Rerun viewer; returns when the viewer is closed."""
-    command = [sys.executable, "-m", "rerun", str(recording_file(run))]
-    if subprocess.run(command, check=False).returncode != 0:
-        raise ViewerError("view: the Rerun viewer could not open a window on this machine.")
+    command = [*_RERUN, str(recording_file(run))]
+    if subprocess.run(command, check=False, stderr=subprocess.DEVNULL).returncode != 0:
+        raise ViewerError(f"view: {_NO_WINDOW}")
+
+
+def open_viewer() -> str:
+    """Opens an empty viewer that outlives this process; returns the URL to stream to.
+
+    Raises:
+        ViewerError: This machine cannot show a window.
+    """
+    process, url = _start("--hide-welcome-screen")
+    if _connect(process, url) is None:
+        raise ViewerError(f"--live: {_NO_WINDOW}")
+    return url
 
 
 def screenshot(run: Path, at_s: float, picture: Path) -> None:
@@ -57,7 +72,7 @@ def screenshot(run: Path, at_s: float, picture: Path) -> None:
         ViewerError: This machine cannot draw.
     """
     path = recording_file(run)
-    with _headless_viewer() as client:
+    with headless_viewer() as client:
         client.open(str(path.resolve()))
         start, end = _time_range(client)
         if not start <= at_s <= end:
@@ -68,22 +83,44 @@ def screenshot(run: Path, at_s: float, picture: Path) -> None:
 
 
 @contextlib.contextmanager
-def _headless_viewer() -> Iterator[ViewerClient]:
-    """A viewer process without a window; its log is dropped."""
+def headless_viewer() -> Iterator[ViewerClient]:
+    """A viewer without a window, closed at the end.
+
+    Raises:
+        ViewerError: This machine cannot draw.
+    """
+    process, url = _start("--headless", "--window-size", _SIZE)
+    try:
+        client = _connect(process, url)
+        if client is None:
+            raise ViewerError(
+                "screenshot: the headless viewer did not start; it needs a Vulkan driver "
+                f"(Debian: apt-get install {_PACKAGES})."
+            )
+        yield client
+    finally:
+        # The viewer is a child of the process that was started: both must go.
+        with contextlib.suppress(ProcessLookupError):
+            os.killpg(process.pid, signal.SIGKILL)
+        process.wait()
+
+
+def _start(*options: str) -> tuple[subprocess.Popen[bytes], str]:
+    """Starts a viewer process in its own group; its URL. Its log is dropped."""
     with socket.socket() as probe:
         probe.bind(("127.0.0.1", 0))
         port = probe.getsockname()[1]
-    command = [sys.executable, "-m", "rerun", "--headless", "--port", str(port)]
-    with tempfile.TemporaryFile() as log:
-        process = subprocess.Popen([*command, "--window-size", _SIZE], stdout=log, stderr=log)
-        try:
-            yield _connect(process, f"rerun+http://127.0.0.1:{port}/proxy")
-        finally:
-            process.terminate()
-            process.wait()
+    process = subprocess.Popen(
+        [*_RERUN, "--port", str(port), *options],
+        stdout=subprocess.DEVNULL,
+        stderr=subprocess.DEVNULL,
+        start_new_session=True,
+    )
+    return process, f"rerun+http://127.0.0.1:{port}/proxy"
 
 
-def _connect(process: subprocess.Popen[bytes], url: str) -> ViewerClient:
+def _connect(process: subprocess.Popen[bytes], url: str) -> ViewerClient | None:
+    """A client once the viewer answers; None if it never does."""
     deadline = time.monotonic() + _LOADING_S
     while process.poll() is None and time.monotonic() < deadline:
         # The client raises bare RuntimeErrors while the viewer is not up.
@@ -92,10 +129,7 @@ def _connect(process: subprocess.Popen[bytes], url: str) -> ViewerClient:
             client.get_state()
             return client
         time.sleep(_POLL_S)
-    raise ViewerError(
-        "screenshot: the headless viewer did not start; it needs a Vulkan driver "
-        f"(Debian: apt-get install {_PACKAGES})."
-    )
+    return None
 
 
 def _time_range(client: ViewerClient) -> tuple[float, float]:
