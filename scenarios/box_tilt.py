@@ -12,6 +12,7 @@ from sim.scenario import (
     Scenario,
     Support,
 )
+from sim.settings import LEAVE, REACH, TILT
 
 # Table II of the paper.
 WEIGHT = 20.0  # [N]
@@ -97,4 +98,5 @@ SCENARIO = Scenario(
         point_W=(EDGE_X, 0.0, 0.0),
         axis_W=(0.0, -1.0, 0.0),
     ),
+    phases=(*REACH, *TILT, *LEAVE),
 )

@@ -89,7 +89,7 @@ class Run:
     def _request(self) -> Request:
         from scenarios import scenario
         from sim.run import Request
-        from sim.settings import controllers
+        from sim.settings import controllers, stretched
         from synthesis.problem import Objective
 
         chosen = scenario(self.scenario)
@@ -103,7 +103,7 @@ class Run:
                 raise InvalidInputError("--objective", self.objective, valid)
             control = replace(control, objective=Objective(self.objective))
         if self.duration is not None:
-            chosen = replace(chosen, timing=replace(chosen.timing, tilt_s=self.duration))
+            chosen = replace(chosen, phases=stretched(chosen.phases, self.duration))
         if self.seed < 0:
             raise InvalidInputError("--seed", self.seed, "an integer >= 0")
         return Request(chosen, self.controller, control, self.seed, self._out(), self.live)

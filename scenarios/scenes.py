@@ -7,7 +7,6 @@ from pathlib import Path
 import assets
 from scenarios import scenarios
 from sim.ik import plan_joints
-from sim.path import Schedule, ScrewPath
 from sim.plant import Plant
 from sim.scenario import Scenario
 from sim.scene import compose
@@ -15,10 +14,8 @@ from sim.scene import compose
 
 def scene_xml(scenario: Scenario) -> str:
     """The scene's MJCF, with the start as its keyframe ``start``."""
-    path = ScrewPath(scenario.path)
-    start = plan_joints(scenario, path, Schedule(scenario.timing, path.end)).q[0]
     plant = Plant(scenario)
-    plant.reset(start)
+    plant.reset(plan_joints(scenario).start)
     spec = compose(scenario)
     spec.add_key(name="start", qpos=plant.physics.data.qpos)
     header = f"<!-- {scenario.summary}. Made by `make assets`: do not edit. -->\n"

@@ -16,7 +16,6 @@ from dataclasses import dataclass
 import numpy as np
 
 from sim.ik import JointPath
-from sim.path import Schedule
 from sim.plant import Measurement
 from sim.robot import RobotModel
 from sim.scenario import Scenario
@@ -33,6 +32,7 @@ class Command:
     Attributes:
         tau: Torques within the limits [N·m or N], (l,).
         saturated: Which torques were cut at their limit, (l,).
+        phase: Index of the phase.
         q_ref: Reference angles [rad or m], (l,).
         tilt_ref: Reference tilt [rad].
         w_OC_C: Commanded wrenches on the object in contact axes [N, N·m], (m, 6).
@@ -42,6 +42,7 @@ class Command:
 
     tau: Array
     saturated: Array
+    phase: int
     q_ref: Array
     tilt_ref: float
     w_OC_C: Array
@@ -58,11 +59,10 @@ class Controller:
         control: Control,
         robot: RobotModel,
         joint_path: JointPath,
-        schedule: Schedule,
     ) -> None:
         self._control = control
         self._robot = robot
-        self._path, self._schedule = joint_path, schedule
+        self._path, self._schedule = joint_path, joint_path.schedule
         self._statics = Statics(scenario, control, robot)
         self._synthesizer = Synthesizer()
         self._tick = 0
@@ -73,17 +73,18 @@ class Controller:
 
     def command(self, measurement: Measurement) -> Command:
         """The torques for the next step."""
-        t = measurement.t
-        tilt, rate = self._schedule.tilt(t)
-        q_ref, slope = self._path(tilt)
+        reference = self._schedule.at(measurement.t)
+        q_ref, slope = self._path.at(reference.phase, reference.progress)
+        qd_ref = slope * reference.rate
         synthesis_s, failed = 0.0, False
         if self._tick % self._control.solve_every == 0:
-            started = time.perf_counter()
-            failed = not self._synthesize(measurement)
-            synthesis_s = time.perf_counter() - started
+            self._update_model(measurement)
+            if not self._schedule.free[reference.phase]:
+                started = time.perf_counter()
+                failed = not self._synthesize(measurement)
+                synthesis_s = time.perf_counter() - started
         self._tick += 1
-        share = float(self._schedule.grip(t)) if self._control.feedforward else 0.0
-        qd_ref = slope * rate
+        share = reference.grip if self._control.feedforward else 0.0
         tau = self._tau_g + share * self._tau_f + self._robot.damping * qd_ref
         omega = self._control.bandwidth
         acceleration = omega**2 * (q_ref - measurement.q) + 2.0 * omega * (qd_ref - measurement.qd)
@@ -93,18 +94,21 @@ class Controller:
             tau=limited,
             saturated=limited != tau,
             q_ref=q_ref,
-            tilt_ref=float(tilt),
+            phase=reference.phase,
+            tilt_ref=reference.tilt,
             w_OC_C=share * self._w_OC_C,
             synthesis_s=synthesis_s,
             failed=failed,
         )
 
-    def _synthesize(self, measurement: Measurement) -> bool:
-        problem = self._statics.problem(measurement)
-        assert problem.joints is not None
-        self._tau_g = problem.joints.tau_g
+    def _update_model(self, measurement: Measurement) -> None:
+        self._robot.update(measurement.q)
         self._mass_matrix = self._robot.mass_matrix()
+        self._tau_g = self._robot.gravity()
+
+    def _synthesize(self, measurement: Measurement) -> bool:
         try:
+            problem = self._statics.problem(measurement.p_WO, measurement.quat_WO)
             solution = self._synthesizer.solve(problem)
         except (InfeasibleError, UnboundedError, SolverError):
             return False

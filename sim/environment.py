@@ -10,10 +10,11 @@ from dm_control.rl import control
 from dm_env import specs
 
 from sim.ik import plan_joints
-from sim.path import Schedule, ScrewPath
+from sim.path import ScrewPath
 from sim.plant import Plant
 from sim.robot import RobotModel
 from sim.scenario import Scenario
+from sim.schedule import Schedule
 from synthesis.contact import Array
 
 
@@ -34,8 +35,7 @@ class TiltTask(control.Task):
         self._plant = plant
         self._path = ScrewPath(scenario.path)
         self._robot = RobotModel(scenario)
-        schedule = Schedule(scenario.timing, self._path.end)
-        self._start = plan_joints(scenario, self._path, schedule).q[0]
+        self._start = plan_joints(scenario).start
         self._deviation = scenario.robot.start_deviation
         self._random = np.random.default_rng(seed)
         self._p_WC = np.zeros((len(scenario.contact_names), 3))
@@ -98,7 +98,7 @@ def make_environment(
     return control.Environment(
         plant.physics,
         TiltTask(scenario, plant, seed),
-        time_limit=scenario.timing.total_s,
+        time_limit=Schedule(scenario).total_s,
         control_timestep=control_timestep
         or scenario.control.solve_every * scenario.physics.timestep,
         legacy_step=False,  # else new contacts would be read with old forces

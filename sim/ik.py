@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
+from typing import NamedTuple
 
 import mink
 import mujoco
@@ -13,14 +14,16 @@ from scipy.spatial.transform import Rotation
 
 from assets import velocity_limits
 from sim.contacts import ContactFrames
-from sim.path import Schedule, ScrewPath
+from sim.path import ScrewPath
 from sim.scenario import Scenario
-from sim.scene import ObjectMotion, compose, tip_geom, tip_site
-from synthesis import FulcrumError
+from sim.scene import ObjectMotion, compose, tip_geom, tip_site, unwanted_pairs
+from sim.schedule import Schedule
+from synthesis import FulcrumError, InvalidInputError
 from synthesis.contact import Array
 
-# A cubic spline through 1 deg steps follows the hands' circle to under a micrometre.
-_STEP_DEG = 1.0
+# A cubic spline through these steps follows the hands to under a micrometre.
+_STEP_DEG, _STEP_M = 1.0, 0.005
+_SMALLEST_STEPS = 4
 _ITERATIONS = 50
 # Pose error at which a step counts as solved [m and rad].
 _SOLVED = 1e-9
@@ -34,52 +37,81 @@ _NAMED_COLLISIONS = 3
 
 
 class PathError(FulcrumError):
-    """The arms cannot follow the object's path; says from which tilt on, and which limit stops."""
+    """The arms cannot follow the object's path; says at which tilt, and which limit stops."""
 
-    def __init__(self, tilt_deg: float, error: float, reasons: list[str]) -> None:
-        self.tilt_deg = tilt_deg
+    def __init__(self, tilt: float, gap: float, error: float, reasons: list[str]) -> None:
+        self.tilt_deg = float(np.degrees(tilt))
         self.reasons = reasons
         super().__init__(
-            f"inverse kinematics follows the path only up to a tilt of {tilt_deg:.1f} deg "
-            f"(pose error {error:.2g} m/rad): {'; '.join(reasons)}."
+            f"inverse kinematics cannot follow the path at a tilt of {self.tilt_deg:.1f} deg with "
+            f"the hands {1e3 * gap:.0f} mm off their contacts (pose error {error:.2g} m/rad): "
+            f"{'; '.join(reasons)}."
         )
 
 
 @dataclass(frozen=True, eq=False)
 class JointPath:
-    """Joint angles as a function of the tilt.
+    """Joint angles as functions of each phase's progress.
 
     Attributes:
-        tilts: Grid of tilts [rad], (k,).
-        q: Joint angles [rad or m] at the grid, (k, l), in the order of the scene's motors.
-        clearance: Smallest distance to a joint limit over the path [rad or m], (l,).
+        schedule: The phases.
+        progress: Grid of progresses of each phase, (k,).
+        q: Joint angles [rad or m] of each phase at its grid, (k, l), in the order of the motors.
+        clearance: Smallest distance to a joint limit over the manoeuvre [rad or m], (l,).
     """
 
-    tilts: Array
-    q: Array
+    schedule: Schedule
+    progress: tuple[Array, ...]
+    q: tuple[Array, ...]
     clearance: Array
 
     @cached_property
-    def _spline(self) -> CubicSpline:
-        return CubicSpline(self.tilts, self.q)
+    def _splines(self) -> tuple[CubicSpline, ...]:
+        return tuple(CubicSpline(x, q) for x, q in zip(self.progress, self.q, strict=True))
 
-    def __call__(self, tilt: Array | float) -> tuple[Array, Array]:
-        """Angles, (..., l), and their derivatives by the tilt, (..., l), at tilts [rad]."""
-        return self._spline(tilt), self._spline(tilt, 1)
+    @property
+    def start(self) -> Array:
+        """Where the manoeuvre starts, (l,)."""
+        return self.q[0][0]
+
+    def at(self, phase: int, progress: float) -> tuple[Array, Array]:
+        """Angles, (l,), and their derivatives by the progress, (l,)."""
+        spline = self._splines[phase]
+        return spline(progress), spline(progress, 1)
+
+    def holding(self, tilt: float) -> Array:
+        """Angles, (l,), that hold the object at a tilt of the path [rad].
+
+        Raises:
+            InvalidInputError: The manoeuvre does not come through that tilt.
+        """
+        end = self.schedule.end
+        for index, phase in enumerate(self.schedule.phases):
+            low, high = self.schedule.before(index).tilt, phase.tilt
+            if phase.grip > 0.0 and low < high and low <= tilt / end <= high:
+                return self.at(index, (tilt / end - low) / (high - low))[0]
+        given = f"{np.degrees(tilt):g} deg"
+        raise InvalidInputError("tilt", given, f"between 0 and {np.degrees(end):g} deg")
 
 
-def plan_joints(scenario: Scenario, path: ScrewPath, schedule: Schedule) -> JointPath:
-    """Follows the path with all hands, within joint, speed and collision limits.
+def plan_joints(scenario: Scenario) -> JointPath:
+    """Follows the manoeuvre with all hands, within joint, speed and collision limits.
 
     Raises:
         PathError: A limit stops the arms; names it and the tilt.
     """
-    return _Follower(scenario, path).follow(schedule)
+    return _Follower(scenario).follow()
+
+
+class _Target(NamedTuple):
+    tilt: float  # [rad]
+    gap: float  # [m]
 
 
 class _Follower:
-    def __init__(self, scenario: Scenario, path: ScrewPath) -> None:
-        self._scenario, self._path = scenario, path
+    def __init__(self, scenario: Scenario) -> None:
+        self._scenario, self._path = scenario, ScrewPath(scenario.path)
+        self._schedule = Schedule(scenario)
         self._frames = ContactFrames(scenario)
         spec = compose(scenario, ObjectMotion.POSED)
         # mink leaves out geoms that physics would not let collide; no physics runs in this scene.
@@ -107,26 +139,40 @@ class _Follower:
             collision_detection_distance=_DETECTION,
         )
 
-    def follow(self, schedule: Schedule) -> JointPath:
-        steps = max(2, int(np.ceil(np.degrees(self._path.end) / _STEP_DEG)) + 1)
-        tilts = np.linspace(0.0, self._path.end, steps)
-        durations = np.diff(schedule.times(tilts))
-        self._reach(0.0, None, None)
-        q = [self._configuration.q.copy()]
-        for previous, tilt, duration in zip(tilts, tilts[1:], durations, strict=False):
-            self._reach(float(tilt), float(previous), float(duration))
-            q.append(self._configuration.q.copy())
-        joints = np.array(q)
-        low, high = self._model.jnt_range.T
-        clearance = np.minimum(joints - low, high - joints).min(axis=0)
-        order = self._motor_dofs
-        return JointPath(tilts=tilts, q=joints[:, order], clearance=clearance[order])
+    def follow(self) -> JointPath:
+        self._reach(_Target(0.0, self._scenario.standoff), None)
+        progress, q = [], []
+        for index in range(len(self._schedule.phases)):
+            grid, targets = self._targets(index)
+            postures = [self._configuration.q.copy()]
+            for target, duration in zip(
+                targets[1:], np.diff(self._schedule.times(index, grid)), strict=True
+            ):
+                self._reach(target, float(duration))
+                postures.append(self._configuration.q.copy())
+            progress.append(grid)
+            q.append(np.array(postures)[:, self._motor_dofs])
+        low, high = self._model.jnt_range[self._motor_dofs].T
+        every = np.concatenate(q)
+        clearance = np.minimum(every - low, high - every).min(axis=0)
+        return JointPath(self._schedule, tuple(progress), tuple(q), clearance)
 
-    def _reach(self, tilt: float, previous: float | None, duration: float | None) -> None:
-        """Brings the hands to a tilt, within a duration [s] if one is given."""
-        self._pose_object(tilt)
-        for task, target in zip(self._tasks, self._tip_poses(tilt), strict=True):
-            task.set_target(target)
+    def _targets(self, index: int) -> tuple[Array, list[_Target]]:
+        """Grid of a phase's progress, fine enough for its motion, and what to reach there."""
+        phase, before = self._schedule.phases[index], self._schedule.before(index)
+        degrees = abs(phase.tilt - before.tilt) * np.degrees(self._path.end)
+        distance = abs(phase.gap - before.gap)
+        steps = max(_SMALLEST_STEPS, int(np.ceil(max(degrees / _STEP_DEG, distance / _STEP_M))))
+        grid = np.linspace(0.0, 1.0, steps + 1)
+        tilts = self._path.end * (before.tilt + (phase.tilt - before.tilt) * grid)
+        gaps = before.gap + (phase.gap - before.gap) * grid
+        return grid, [_Target(float(t), float(g)) for t, g in zip(tilts, gaps, strict=True)]
+
+    def _reach(self, target: _Target, duration: float | None) -> None:
+        """Brings the hands to a target, within a duration [s] if one is given."""
+        self._pose_object(target.tilt)
+        for task, pose in zip(self._tasks, self._tip_poses(target), strict=True):
+            task.set_target(pose)
         limits: list[mink.Limit] = [mink.ConfigurationLimit(self._model), self._collisions]
         dt = 1.0
         if duration is not None:
@@ -151,18 +197,18 @@ class _Follower:
         if duration is not None:
             too_fast = moved >= (1.0 - _AT_LIMIT) * duration * self._qd_max
         if self._error() >= _SOLVED or too_fast.any():
-            reached = tilt if previous is None else previous
-            raise PathError(float(np.degrees(reached)), self._error(), self._reasons(too_fast))
+            raise PathError(target.tilt, target.gap, self._error(), self._reasons(too_fast))
 
-    def _tip_poses(self, tilt: float) -> list[mink.SE3]:
-        """Poses in the world of the hands' tips that touch the object at a tilt [rad]."""
-        R_WO, p_WO = self._path.pose(tilt)
+    def _tip_poses(self, target: _Target) -> list[mink.SE3]:
+        """Poses in the world of the hands' tips that face their contacts across the gap."""
+        R_WO, p_WO = self._path.pose(target.tilt)
         R_WC = self._frames.in_world(R_WO)
         p_WC = self._frames.points(R_WO, p_WO)
         poses = []
         for R, p, radius in zip(R_WC, p_WC, self._radii, strict=False):
             orientation = mink.SO3(Rotation.from_matrix(R).as_quat(scalar_first=True))
-            poses.append(mink.SE3.from_rotation_and_translation(orientation, p - radius * R[:, 2]))
+            center = p - (radius + target.gap) * R[:, 2]
+            poses.append(mink.SE3.from_rotation_and_translation(orientation, center))
         return poses
 
     def _error(self) -> float:
@@ -211,17 +257,10 @@ class _Follower:
         """
         model, scenario = self._model, self._scenario
         surroundings = [g.name for g in (*scenario.object.geoms, *scenario.environment)]
-        links = [
-            model.geom(g).name for g in range(model.ngeom) if model.geom(g).name not in surroundings
-        ]
+        names = [model.geom(g).name for g in range(model.ngeom)]
+        links = [name for name in names if name not in surroundings]
         moving = [name for name in links if model.body_weldid[model.geom(name).bodyid[0]] != 0]
-        touching = {(tip_geom(hand), hand.geom) for hand in scenario.hands}
-        pairs = [
-            ([link], [other])
-            for link in moving
-            for other in surroundings
-            if (link, other) not in touching
-        ]
+        pairs = [([link], [other]) for link, other in unwanted_pairs(scenario, model)]
         for i, link in enumerate(moving):
             for other in (*moving[i + 1 :], *(name for name in links if name not in moving)):
                 first, second = model.geom(link), model.geom(other)

@@ -9,7 +9,7 @@ import numpy as np
 from sim.contacts import ContactFrames
 from sim.controller import Controller
 from sim.ik import plan_joints
-from sim.path import Schedule, ScrewPath
+from sim.path import ScrewPath
 from sim.plant import Measurement, Plant
 from sim.robot import RobotModel
 from sim.scenario import Scenario
@@ -49,21 +49,25 @@ class ClosedLoop:
             PathError: The arms cannot follow the path.
         """
         self._path = ScrewPath(scenario.path)
-        schedule = Schedule(scenario.timing, self._path.end)
         self.robot = robot = RobotModel(scenario)
-        joint_path = plan_joints(scenario, self._path, schedule)
-        self._controller = Controller(scenario, control, robot, joint_path, schedule)
+        joint_path = plan_joints(scenario)
+        self._controller = Controller(scenario, control, robot, joint_path)
         self._plant = Plant(truth or scenario)
         deviation = np.random.default_rng(seed).normal(size=len(robot.joints))
-        self._plant.reset(joint_path.q[0] + scenario.robot.start_deviation * deviation)
+        self._plant.reset(joint_path.start + scenario.robot.start_deviation * deviation)
         dt = (truth or scenario).physics.timestep
         self.steps = 0
-        self.total_steps = round(scenario.timing.total_s / dt)
+        self.total_steps = round(joint_path.schedule.total_s / dt)
         self._block = max(1, round(_BLOCK_S / dt))
         self.trace = Trace.allocate(
             self.total_steps, len(robot.joints), len(scenario.hands), len(scenario.contact_names)
         )
         self._p_WC = ContactFrames(scenario).points(*self._path.pose(0.0))
+
+    @property
+    def collisions(self) -> dict[tuple[str, str], float]:
+        """Pairs of geoms that touched against the scenario's will, and when first [s]."""
+        return self._plant.collisions
 
     def run(self) -> Iterator[Trace]:
         """Steps to the end, handing over each block of rows as soon as it is full."""
@@ -84,13 +88,14 @@ class ClosedLoop:
         plant.apply(command.tau)
         plant.step()
         self._write_state(row, measurement)
+        trace.phase[row] = command.phase
         trace.q_ref[row], trace.tilt_ref[row] = command.q_ref, command.tilt_ref
         trace.tau[row], trace.saturated[row] = command.tau, command.saturated
         trace.w_command_C[row] = command.w_OC_C
         trace.synthesis_s[row], trace.failed[row] = command.synthesis_s, command.failed
         plant.tips(trace.p_WE[row], trace.quat_WE[row], trace.twist_WE[row])
         plant.object_twist(trace.twist_WO[row])
-        plant.contacts(self._p_WC, trace.f_W[row])
+        trace.collisions[row] = plant.contacts(self._p_WC, trace.f_W[row])
         trace.p_WC[row] = self._p_WC
 
     def _write_state(self, row: int, measurement: Measurement) -> None:

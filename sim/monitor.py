@@ -9,6 +9,7 @@ from scipy.spatial.transform import Rotation
 
 from sim.contacts import ContactFrames, true_contacts
 from sim.scenario import Scenario
+from sim.schedule import Schedule
 from sim.trace import Trace
 from synthesis.contact import M_N, Array, Mask, N, utilisation
 
@@ -21,7 +22,8 @@ class ContactHistory:
         R_WC: Contact axes in the world, (k, m, 3, 3).
         w_OC_C: Measured wrenches on the object in contact axes [N, N·m], (k, m, 6).
         kept: Whether there was a normal force, (k, m).
-        slip: Tangential drift of the material points that touched when grip was built up [m].
+        slip: Tangential drift of the material points that touched when grip was built up [m], (k,
+            m); 0 while not held.
         slide: Integral of the tangential speed at the contact since then [m].
         spin: Integral of the angular velocity about the contact normal since then [rad].
         utilisation: Of the true friction [-].
@@ -43,12 +45,15 @@ class ContactHistory:
 
 
 class Monitor:
-    """Follows the contacts block by block; material points are marked at the settling time."""
+    """Follows the contacts block by block; material points are marked when grip is built up.
+
+    Drift counts while the object is held with full grip: before and after, hands may come and go.
+    """
 
     def __init__(self, scenario: Scenario) -> None:
         self._contacts = true_contacts(scenario)
         self._hands = len(scenario.hands)
-        self._settled_s = scenario.timing.grip_s
+        self._held = Schedule(scenario).held
         self._dt = scenario.physics.timestep
         self._frames = ContactFrames(scenario)
         self._marks: tuple[Array, Array, Array] | None = None
@@ -62,10 +67,10 @@ class Monitor:
         w_OC_C = np.zeros((len(block), len(self._contacts), 6))
         w_OC_C[..., :3] = np.einsum("kmji,kmj->kmi", R_WC, block.f_W[..., :3])
         w_OC_C[..., M_N] = block.f_W[..., 3]
-        settled = block.t >= self._settled_s - 0.5 * self._dt
+        held = self._held[block.phase.astype(int)]
         normal = R_WC[..., :, N]
-        slip = self._slips(block, R_WO, normal, settled)
-        slide, spin = self._integrals(block, normal, settled)
+        slip = self._slips(block, R_WO, normal, held)
+        slide, spin = self._integrals(block, normal, held)
         return ContactHistory(
             R_WC=R_WC,
             w_OC_C=w_OC_C,
@@ -76,14 +81,14 @@ class Monitor:
             utilisation=utilisation(self._contacts, w_OC_C),
         )
 
-    def _slips(self, block: Trace, R_WO: Array, normal: Array, settled: Mask) -> Array:
+    def _slips(self, block: Trace, R_WO: Array, normal: Array, held: Mask) -> Array:
         """Distance of the two material points of each contact in its tangent plane."""
         slip = np.zeros(block.p_WC.shape[:2])
-        if not settled.any():
+        if not held.any():
             return slip
         R_WE = _rotations(block.quat_WE)
         if self._marks is None:
-            first = int(np.argmax(settled))
+            first = int(np.argmax(held))
             p_WC = block.p_WC[first]
             p_OC_O = (p_WC - block.p_WO[first]) @ R_WO[first]
             hands = p_WC[: self._hands] - block.p_WE[first]
@@ -94,10 +99,10 @@ class Monitor:
         on_hands = block.p_WE + np.einsum("knij,nj->kni", R_WE, p_EC_E)
         on_supports = np.broadcast_to(p_WP, (len(block), *p_WP.shape))
         drift = on_object - np.concatenate([on_hands, on_supports], axis=1)
-        slip[settled] = np.linalg.norm(_tangential(drift, normal), axis=-1)[settled]
+        slip[held] = np.linalg.norm(_tangential(drift, normal), axis=-1)[held]
         return slip
 
-    def _integrals(self, block: Trace, normal: Array, settled: Mask) -> tuple[Array, Array]:
+    def _integrals(self, block: Trace, normal: Array, held: Mask) -> tuple[Array, Array]:
         """Integrals of tangential speed and of spin about the normal, of object against other."""
         n, linear, angular = self._hands, slice(0, 3), slice(3, 6)
         turn_O = np.broadcast_to(block.twist_WO[:, None, angular], block.p_WC.shape)
@@ -108,7 +113,7 @@ class Monitor:
         turn_E = block.twist_WE[..., angular]
         velocity[:, :n] -= block.twist_WE[..., linear] + np.cross(turn_E, lever_E)
         turn[:, :n] -= turn_E
-        live = settled[:, None] * self._dt
+        live = held[:, None] * self._dt
         speed = np.linalg.norm(_tangential(velocity, normal), axis=-1)
         slide = self._slide + np.cumsum(speed * live, axis=0)
         spin = self._spin + np.cumsum(np.sum(turn * normal, axis=-1) * live, axis=0)

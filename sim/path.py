@@ -6,7 +6,6 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from sim.scenario import Pivot, Pose
-from sim.settings import Timing
 from synthesis import InvalidInputError
 from synthesis.contact import Array
 
@@ -61,37 +60,3 @@ def minimum_jerk(x: Array | float) -> tuple[Array, Array]:
     """
     x = np.clip(x, 0.0, 1.0)
     return x**3 * (10.0 + x * (6.0 * x - 15.0)), 30.0 * x**2 * (1.0 - x) ** 2
-
-
-class Schedule:
-    """When the phases are, and which tilt they ask for."""
-
-    PHASES = ("grip", "tilt", "hold")
-
-    def __init__(self, timing: Timing, end: float) -> None:
-        self._timing = timing
-        self._end = end
-
-    @property
-    def settled_s(self) -> float:
-        """When grip is built up, and contacts are held to account [s]."""
-        return self._timing.grip_s
-
-    def tilt(self, t: Array | float) -> tuple[Array, Array]:
-        """Reference tilt [rad] and its rate [rad/s] at times t [s]."""
-        s, rate = minimum_jerk((t - self._timing.grip_s) / self._timing.tilt_s)
-        return self._end * s, self._end * rate / self._timing.tilt_s
-
-    def times(self, tilts: Array) -> Array:
-        """When the reference passes tilts [rad] that rise from 0 to the end [s]."""
-        t = np.linspace(self._timing.grip_s, self._timing.grip_s + self._timing.tilt_s, 10_001)
-        return np.interp(tilts, self.tilt(t)[0], t)
-
-    def grip(self, t: Array | float) -> Array:
-        """Share of the synthesised forces that is applied at times t [s], from 0 to 1."""
-        return minimum_jerk(t / self._timing.grip_s)[0]
-
-    def phase(self, t: float) -> str:
-        """Name of the phase at time t [s]."""
-        ends = np.cumsum([self._timing.grip_s, self._timing.tilt_s])
-        return self.PHASES[int(np.searchsorted(ends, t, side="right"))]

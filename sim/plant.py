@@ -9,7 +9,7 @@ import mujoco
 import numpy as np
 
 from sim.scenario import Scenario
-from sim.scene import compose, tip_geom, tip_site
+from sim.scene import compose, tip_geom, tip_site, unwanted_pairs
 from synthesis.contact import Array
 
 with warnings.catch_warnings():  # dm_control looks for a display on import; none is needed
@@ -45,6 +45,11 @@ class Plant:
 
     After :meth:`step` contact forces, tip and object poses belong to the state *before* the step,
     for which they were computed; :meth:`measure` gives the state after it.
+
+    Attributes:
+        physics: dm_control's Physics.
+        joints: Names of the driven joints, in the order of the motors.
+        collisions: Pairs of geoms that touched against the scenario's will, and when first [s].
     """
 
     def __init__(self, scenario: Scenario) -> None:
@@ -73,6 +78,8 @@ class Plant:
             [self._points_O.reshape(-1, 3), *(np.array([s.p_OP_O]) for s in scenario.supports)]
         )
         self._object_geoms = {model.geom(g.name).id for g in scenario.object.geoms}
+        self._unwanted = {self._pair(*pair) for pair in unwanted_pairs(scenario, model)}
+        self.collisions: dict[tuple[str, str], float] = {}
         self._buffer = np.zeros(6)
 
     def _pair(self, first: str, second: str) -> tuple[int, int]:
@@ -81,6 +88,7 @@ class Plant:
 
     def reset(self, q: Array) -> None:
         """Puts the robot at rest at joint angles q, (l,), and the object at its start."""
+        self.collisions.clear()
         with self.physics.reset_context():
             self.place(q)
 
@@ -127,7 +135,7 @@ class Plant:
         mujoco.mj_objectVelocity(self._model, self._data, kind, index, self._buffer, 0)
         twist[:3], twist[3:] = self._buffer[3:], self._buffer[:3]
 
-    def contacts(self, positions: Array, wrenches: Array) -> None:
+    def contacts(self, positions: Array, wrenches: Array) -> int:
         """Adds up the plant's contacts at each of the scenario's contacts.
 
         Args:
@@ -135,14 +143,22 @@ class Plant:
                 contact it is left as it is.
             wrenches: Written with force on the object in world axes [N] and torsional moment about
                 the normal into the object [N·m], (m, 4); zero where there is no contact.
+
+        Returns:
+            Number of contacts that the scenario does not want; see ``collisions``.
         """
         wrenches[:] = 0.0
+        collisions = 0
         data = self._data
         geoms, points, frames = data.contact.geom, data.contact.pos, data.contact.frame
         for i, (first, second) in enumerate(geoms.tolist()):
             pair = (first, second) if first < second else (second, first)
             index = self._index(pair, points[i])
             if index is None:
+                if pair in self._unwanted:
+                    collisions += 1
+                    names = (self._model.geom(first).name, self._model.geom(second).name)
+                    self.collisions.setdefault(names, data.time)
                 continue
             mujoco.mj_contactForce(self._model, data, i, self._buffer)
             # The contact frame's x axis points from the first geom to the second, and the force
@@ -151,6 +167,7 @@ class Plant:
             wrenches[index, :3] += force if second in self._object_geoms else -force
             wrenches[index, 3] += self._buffer[3]
             positions[index] = points[i]
+        return collisions
 
     def _index(self, pair: tuple[int, int], position: Array) -> int | None:
         """Which of the scenario's contacts a contact of a geom pair at a position is."""

@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from enum import StrEnum
 
 import numpy as np
 
 from sim.monitor import ContactHistory
-from sim.path import Schedule
 from sim.scenario import Scenario
+from sim.schedule import Schedule
 from sim.trace import Trace
 from synthesis.contact import Array, Mask, N
 
@@ -23,8 +24,17 @@ class Verdict(StrEnum):
 
 
 @dataclass(frozen=True)
+class PhaseReport:
+    """A phase that was begun: its name, and when it was [s]."""
+
+    name: str
+    start_s: float
+    end_s: float
+
+
+@dataclass(frozen=True)
 class TiltReport:
-    """Target, final value and errors of the tilt [deg]; errors count once grip is built up."""
+    """Target, final value and errors of the tilt [deg]."""
 
     target_deg: float
     final_deg: float
@@ -34,7 +44,10 @@ class TiltReport:
 
 @dataclass(frozen=True)
 class ContactReport:
-    """What one contact did once grip was built up; utilisation until it let go."""
+    """What one contact did while the object was held with full grip; utilisation until it let go.
+
+    ``free_normal_n`` is the largest normal force while no grip was asked for: a hand's impact.
+    """
 
     kept_fraction: float
     slip_mm: float
@@ -43,6 +56,7 @@ class ContactReport:
     max_utilisation: float
     max_normal_n: float
     force_error_rms_n: float
+    free_normal_n: float
 
 
 @dataclass(frozen=True)
@@ -83,6 +97,7 @@ class Report:
     seed: int
     verdict: Verdict
     failures: tuple[str, ...]
+    phases: tuple[PhaseReport, ...]
     tilt: TiltReport
     contacts: dict[str, ContactReport]
     torque: TorqueReport
@@ -103,6 +118,7 @@ class RunInfo:
         interrupted: Whether the run was stopped before its end.
         error: What ended the run, if something did.
         recording: Name of the recording's file.
+        collisions: Pairs of geoms that touched against the scenario's will, and when first [s].
     """
 
     controller: str
@@ -112,6 +128,7 @@ class RunInfo:
     interrupted: bool = False
     error: str | None = None
     recording: str | None = None
+    collisions: Mapping[tuple[str, str], float] = field(default_factory=dict)
 
 
 class Judge:
@@ -123,24 +140,27 @@ class Judge:
         self._scenario = scenario
         self._joints = joints
         self._tau_min, self._tau_max = tau_min, tau_max
-        self._end = np.radians(scenario.path.angle_deg)
-        self._settled_s = Schedule(scenario.timing, self._end).settled_s
+        self._schedule = Schedule(scenario)
 
     def report(self, info: RunInfo, trace: Trace, history: ContactHistory) -> Report:
         """The report of a run of at least one step."""
-        settled = trace.t >= self._settled_s - 0.5 * self._scenario.physics.timestep
-        tilt = self._tilt(trace, settled)
+        phase = trace.phase.astype(int)
+        held = self._schedule.held[phase]
+        free = self._schedule.free[phase]
+        tilt = self._tilt(trace)
         torque = self._torque(trace)
         contacts = {
-            name: _contact(i, trace, history, settled)
+            name: _contact(i, trace, history, held, free)
             for i, name in enumerate(self._scenario.contact_names)
         }
         if info.interrupted:
             verdict = Verdict.INTERRUPTED
             failures = [f"The run was interrupted at {trace.t[-1]:.2f} s."]
         else:
-            found = self._contact_failures(trace, history, settled, contacts)
-            found += self._tilt_failures(tilt, trace, settled)
+            found = self._contact_failures(trace, history, held, contacts)
+            found += self._hand_failures(trace, history, free)
+            found += self._tilt_failures(tilt, trace)
+            found += [_collision(*names, t) for names, t in info.collisions.items()]
             found += self._torque_failures(torque, trace) + _synthesis_failures(trace)
             found += [] if info.error is None else [_Failure(float(trace.t[-1]), info.error)]
             # In order of time, so that the first is the cause.
@@ -154,6 +174,7 @@ class Judge:
             seed=info.seed,
             verdict=verdict,
             failures=tuple(failures),
+            phases=self._phases(trace),
             tilt=tilt,
             contacts=contacts,
             torque=torque,
@@ -162,13 +183,24 @@ class Judge:
             recording=info.recording,
         )
 
-    def _tilt(self, trace: Trace, settled: Mask) -> TiltReport:
-        error = np.degrees(trace.tilt - trace.tilt_ref)[settled]
+    def _phases(self, trace: Trace) -> tuple[PhaseReport, ...]:
+        schedule, last = self._schedule, float(trace.t[-1])
+        return tuple(
+            PhaseReport(phase.name, float(start), min(float(end), last))
+            for phase, start, end in zip(
+                schedule.phases, schedule.starts, schedule.ends, strict=True
+            )
+            if start <= last
+        )
+
+    def _tilt(self, trace: Trace) -> TiltReport:
+        error = np.degrees(trace.tilt - trace.tilt_ref)
+        target = self._scenario.path.angle_deg * self._schedule.phases[-1].tilt
         return TiltReport(
-            target_deg=self._scenario.path.angle_deg,
+            target_deg=target,
             final_deg=float(np.degrees(trace.tilt[-1])),
             rms_error_deg=_rms(error),
-            max_error_deg=float(np.abs(error).max(initial=0.0)),
+            max_error_deg=float(np.abs(error).max()),
         )
 
     def _torque(self, trace: Trace) -> TorqueReport:
@@ -184,14 +216,14 @@ class Judge:
         self,
         trace: Trace,
         history: ContactHistory,
-        settled: Mask,
+        held_rows: Mask,
         contacts: dict[str, ContactReport],
     ) -> list[_Failure]:
         limits, failures = self._scenario.tolerances, []
         for i, (name, contact) in enumerate(contacts.items()):
-            lost = settled & ~history.kept[:, i]
+            lost = held_rows & ~history.kept[:, i]
             # What a contact does once it has let go is no news.
-            held = settled & ~np.logical_or.accumulate(lost)
+            held = held_rows & ~np.logical_or.accumulate(lost)
             if lost.any():
                 share = 100 * contact.kept_fraction
                 text = f"Contact {name} let go at {{when}}; it was kept {share:.1f} % of the time."
@@ -222,18 +254,40 @@ class Judge:
                 )
                 failures.append(_failure(trace, used, text))
             peak = float(np.abs(trace.w_command_C[:, i, N]).max())
-            if held.all() and contact.force_error_rms_n > limits.force_error * peak:
+            if not lost.any() and contact.force_error_rms_n > limits.force_error * peak:
                 text = (
                     f"Contact {name} followed its commanded normal force only to "
                     f"{contact.force_error_rms_n:.3g} N RMS "
                     f"(allowed {limits.force_error * peak:.3g} N)."
                 )
-                failures.append(_failure(trace, settled, text))
+                failures.append(_failure(trace, held_rows, text))
         return failures
 
-    def _tilt_failures(self, tilt: TiltReport, trace: Trace, settled: Mask) -> list[_Failure]:
+    def _hand_failures(self, trace: Trace, history: ContactHistory, free: Mask) -> list[_Failure]:
+        """Impacts while hands come and go, and hands that touch an object that stands alone."""
+        failures = []
+        last = self._schedule.phases[-1]
+        alone = (trace.phase == len(self._schedule.phases) - 1) & (last.gap > 0.0)
+        for i, hand in enumerate(self._scenario.hands):
+            normal = history.w_OC_C[:, i, N]
+            peak = float(trace.w_command_C[:, i, N].max())
+            impact = free & (normal > peak)
+            if impact.any() and peak > 0.0:
+                text = (
+                    f"Hand {hand.name} hit the object with {normal[free].max():.3g} N at {{when}}, "
+                    f"more than its largest grip of {peak:.3g} N."
+                )
+                failures.append(_failure(trace, impact, text))
+            if (alone & (normal > 0.0)).any():
+                text = (
+                    f"Hand {hand.name} touched the object at {{when}}, when it should stand alone."
+                )
+                failures.append(_failure(trace, alone & (normal > 0.0), text))
+        return failures
+
+    def _tilt_failures(self, tilt: TiltReport, trace: Trace) -> list[_Failure]:
         limits, failures = self._scenario.tolerances, []
-        off = settled & (np.degrees(np.abs(trace.tilt - trace.tilt_ref)) > limits.error_deg)
+        off = np.degrees(np.abs(trace.tilt - trace.tilt_ref)) > limits.error_deg
         if off.any():
             text = (
                 f"The tilt was off by more than the allowed {limits.error_deg:g} deg at {{when}}; "
@@ -264,6 +318,10 @@ class _Failure:
     text: str
 
 
+def _collision(first: str, second: str, t: float) -> _Failure:
+    return _Failure(t, f"{first} touched {second} at {t:.2f} s.")
+
+
 def _failure(trace: Trace, mask: Mask, text: str) -> _Failure:
     """A failure at the first row of a mask; ``{when}`` in its text becomes time and tilt."""
     first = int(np.argmax(mask))
@@ -271,20 +329,24 @@ def _failure(trace: Trace, mask: Mask, text: str) -> _Failure:
     return _Failure(float(trace.t[first]), text.replace("{when}", when))
 
 
-def _contact(i: int, trace: Trace, history: ContactHistory, settled: Mask) -> ContactReport:
-    if not settled.any():
-        return ContactReport(*(0.0 for _ in range(7)))
-    kept = history.kept[settled, i]
+def _contact(
+    i: int, trace: Trace, history: ContactHistory, held_rows: Mask, free: Mask
+) -> ContactReport:
+    impact = float(history.w_OC_C[free, i, N].max(initial=0.0))
+    if not held_rows.any():
+        return ContactReport(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, impact)
+    kept = history.kept[held_rows, i]
     held = np.logical_and.accumulate(kept)
-    normal = history.w_OC_C[settled, i, N]
+    normal = history.w_OC_C[held_rows, i, N]
     return ContactReport(
         kept_fraction=float(kept.mean()),
-        slip_mm=1e3 * float(history.slip[settled, i].max()),
-        slide_mm=1e3 * float(history.slide[settled, i].max()),
-        spin_deg=float(np.degrees(np.abs(history.spin[settled, i]).max())),
-        max_utilisation=float(history.utilisation[settled, i][held].max(initial=0.0)),
+        slip_mm=1e3 * float(history.slip[held_rows, i].max()),
+        slide_mm=1e3 * float(history.slide[held_rows, i].max()),
+        spin_deg=float(np.degrees(np.abs(history.spin[held_rows, i]).max())),
+        max_utilisation=float(history.utilisation[held_rows, i][held].max(initial=0.0)),
         max_normal_n=float(normal.max()),
-        force_error_rms_n=_rms(normal - trace.w_command_C[settled, i, N]),
+        force_error_rms_n=_rms(normal - trace.w_command_C[held_rows, i, N]),
+        free_normal_n=impact,
     )
 
 

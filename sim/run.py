@@ -108,6 +108,7 @@ def execute(request: Request, progress: Progress | None = None) -> Result:
         interrupted=stop.requested,
         error=error,
         recording=None if out is None else RECORDING,
+        collisions=loop.collisions,
     )
     history = ContactHistory.concatenate(histories)
     trace = loop.trace.rows(0, len(history.kept))

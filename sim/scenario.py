@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-from sim.settings import Control, Physics, Timing, Tolerances
+from sim.settings import HOLD, REACH, STANDOFF, TILT, Control, Phase, Physics, Tolerances
 from synthesis import InvalidInputError
 
 GRAVITY = 9.81  # [m/s^2]
@@ -179,7 +179,8 @@ class Scenario:
     supports: tuple[Support, ...]
     robot: Robot
     path: Pivot
-    timing: Timing = Timing()
+    phases: tuple[Phase, ...] = (*REACH, *TILT, *HOLD)
+    standoff: float = STANDOFF
     control: Control = Control()
     physics: Physics = Physics()
     tolerances: Tolerances = Tolerances()

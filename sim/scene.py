@@ -41,6 +41,8 @@ def compose(scenario: Scenario, motion: ObjectMotion = ObjectMotion.FREE) -> muj
     _add_object(spec, scenario, motion)
     if motion is ObjectMotion.FREE:
         _add_pairs(spec, scenario)
+        for first, second in unwanted_pairs(scenario, spec.copy().compile()):
+            spec.add_pair(geomname1=first, geomname2=second)
     _add_view(spec, scenario)
     return spec
 
@@ -58,6 +60,20 @@ def tip_geom(hand: Hand) -> str:
 def tip_site(hand: Hand) -> str:
     """Name of the site at the centre of a hand's tip."""
     return f"{hand.name}_tip_center"
+
+
+def unwanted_pairs(scenario: Scenario, scene: mujoco.MjModel) -> list[tuple[str, str]]:
+    """Pairs of geoms that must not touch: moving links against object and environment."""
+    surroundings = [g.name for g in (*scenario.object.geoms, *scenario.environment)]
+    touching = {(tip_geom(hand), hand.geom) for hand in scenario.hands}
+    geoms = [scene.geom(g) for g in range(scene.ngeom)]
+    links = [g.name for g in geoms if scene.body_weldid[g.bodyid[0]] != 0]
+    return [
+        (link, other)
+        for link in links
+        for other in surroundings
+        if link not in surroundings and (link, other) not in touching
+    ]
 
 
 def _set_options(spec: mujoco.MjSpec, scenario: Scenario) -> None:

@@ -9,23 +9,61 @@ from synthesis import InvalidInputError, Objective
 
 
 @dataclass(frozen=True)
-class Timing:
-    """Durations of the phases [s]: build up grip, tilt along a minimum-jerk profile, hold."""
+class Phase:
+    """A stretch of the manoeuvre: what it brings tilt, hands and grip to, along minimum jerk.
 
-    grip_s: float = 1.0
-    tilt_s: float = 8.0
-    hold_s: float = 0.5
+    Attributes:
+        name: What people call it.
+        duration_s: [s].
+        tilt: Share of the path's angle at the end [-], 0 to 1.
+        gap: Distance of the tips from their contacts, along the outward normals, at the end [m].
+        grip: Share of the synthesised forces that is applied at the end [-], 0 to 1.
+    """
+
+    name: str
+    duration_s: float
+    tilt: float
+    gap: float
+    grip: float
 
     def __post_init__(self) -> None:
-        for name in ("grip_s", "tilt_s", "hold_s"):
-            value = getattr(self, name)
-            if not (math.isfinite(value) and value > 0.0):
-                raise InvalidInputError(f"timing.{name}", value, "a finite duration > 0 s")
+        where = f"phase {self.name}"
+        if not (math.isfinite(self.duration_s) and self.duration_s > 0.0):
+            raise InvalidInputError(f"{where}.duration_s", self.duration_s, "a finite time > 0 s")
+        for field in ("tilt", "grip"):
+            if not 0.0 <= getattr(self, field) <= 1.0:
+                raise InvalidInputError(f"{where}.{field}", getattr(self, field), "in [0, 1]")
+        if not (math.isfinite(self.gap) and self.gap >= 0.0):
+            raise InvalidInputError(f"{where}.gap", self.gap, "a finite distance >= 0 m")
+        if self.gap > 0.0 and self.grip > 0.0:
+            raise InvalidInputError(f"{where}.grip", self.grip, "0 while there is a gap")
 
-    @property
-    def total_s(self) -> float:
-        """Duration of the whole run [s]."""
-        return self.grip_s + self.tilt_s + self.hold_s
+
+STANDOFF = 0.06  # [m] of the hands from the object before and after they hold it
+
+# Approach fast and touch slowly; what comes after the tilt depends on whether the object can stand.
+REACH = (
+    Phase("approach", 1.5, tilt=0.0, gap=0.005, grip=0.0),
+    Phase("touch", 0.8, tilt=0.0, gap=0.0, grip=0.0),
+    Phase("grip", 1.0, tilt=0.0, gap=0.0, grip=1.0),
+)
+TILT = (Phase("tilt", 8.0, tilt=1.0, gap=0.0, grip=1.0),)
+HOLD = (Phase("hold", 0.5, tilt=1.0, gap=0.0, grip=1.0),)
+LEAVE = (
+    Phase("set down", 0.5, tilt=1.0, gap=0.0, grip=1.0),
+    Phase("let go", 1.0, tilt=1.0, gap=0.0, grip=0.0),
+    Phase("withdraw", 1.5, tilt=1.0, gap=STANDOFF, grip=0.0),
+    Phase("stand", 1.0, tilt=1.0, gap=STANDOFF, grip=0.0),
+)
+
+
+def stretched(phases: tuple[Phase, ...], duration_s: float) -> tuple[Phase, ...]:
+    """The phases with every one that tilts the object taking the given time [s]."""
+    before = (0.0, *(phase.tilt for phase in phases))
+    return tuple(
+        replace(phase, duration_s=duration_s) if phase.tilt != tilt else phase
+        for phase, tilt in zip(phases, before, strict=False)
+    )
 
 
 @dataclass(frozen=True)

@@ -6,11 +6,11 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from sim.contacts import ContactFrames, contacts
-from sim.plant import Measurement
 from sim.robot import RobotModel
 from sim.scenario import GRAVITY, Scenario
 from sim.settings import Control
 from synthesis import Problem
+from synthesis.contact import Array
 
 
 class Statics:
@@ -25,13 +25,12 @@ class Statics:
         self._weight_W = np.array([0.0, 0.0, -scenario.object.mass * GRAVITY])
         self._center_O = np.asarray(scenario.object.center_of_mass)
 
-    def problem(self, measurement: Measurement) -> Problem:
-        """The problem at the measured pose of the object and angles of the robot."""
-        R_WO = Rotation.from_quat(measurement.quat_WO, scalar_first=True).as_matrix()
+    def problem(self, p_WO: Array, quat_WO: Array) -> Problem:
+        """The problem at a pose of the object and the angles that the robot was last updated to."""
+        R_WO = Rotation.from_quat(quat_WO, scalar_first=True).as_matrix()
         R_OC = self._frames.in_object(R_WO)
-        p_WC = self._frames.points(R_WO, measurement.p_WO)
+        p_WC = self._frames.points(R_WO, p_WO)
         weight_O = R_WO.T @ self._weight_W
-        self._robot.update(measurement.q)
         return Problem(
             contacts=self._contacts,
             R_OC=R_OC,

@@ -18,6 +18,7 @@ class Trace:
 
     Attributes:
         t: (k,).
+        phase: Index of the phase, (k,).
         tilt_ref: Reference tilt [rad], (k,).
         tilt: Measured tilt [rad], (k,).
         p_WO, quat_WO, twist_WO: Object pose and twist (linear first), (k, 3 | 4 | 6).
@@ -30,9 +31,11 @@ class Trace:
         w_command_C: Commanded wrenches on the object in contact axes, (k, m, 6).
         synthesis_s: Wall time of the synthesis; 0 where none was due, (k,).
         failed: Syntheses without solution, (k,).
+        collisions: Contacts that the scenario does not want, (k,).
     """
 
     t: Array
+    phase: Array
     tilt_ref: Array
     tilt: Array
     p_WO: Array
@@ -51,12 +54,15 @@ class Trace:
     w_command_C: Array
     synthesis_s: Array
     failed: Array
+    collisions: Array
 
     @staticmethod
     def allocate(steps: int, joints: int, hands: int, contacts: int) -> Trace:
         """An all-zero trace, to be filled row by row."""
         shapes = {
-            **dict.fromkeys(("t", "tilt_ref", "tilt", "synthesis_s", "failed"), ()),
+            **dict.fromkeys(
+                ("t", "phase", "tilt_ref", "tilt", "synthesis_s", "failed", "collisions"), ()
+            ),
             **dict.fromkeys(("q", "qd", "q_ref", "tau", "saturated"), (joints,)),
             "p_WO": (3,),
             "quat_WO": (4,),

@@ -43,7 +43,9 @@ def blueprint(scenario: Scenario, center: Array) -> rrb.Blueprint:
     )
     return rrb.Blueprint(
         rrb.Horizontal(
-            scene,
+            rrb.Vertical(
+                scene, rrb.StateTimelineView(origin="phase", name="Phase"), row_shares=[7, 1]
+            ),
             rrb.Grid(*curves, texts, grid_columns=2),
             column_shares=[5, 6],
         ),

@@ -76,6 +76,7 @@ class Recorder:
             sinks.append(rr.GrpcSink(viewer_url))
         layout = blueprint(scenario, np.asarray(scenario.path.point_W))
         self._recording.set_sinks(*sinks, default_blueprint=layout)
+        self._phase = -1.0
         self._scenery = Scenery(scenario, joints)
         self._scenery.log_shapes(self._recording)
         self._log_static(config, joints)
@@ -126,12 +127,23 @@ class Recorder:
         if due.any():
             solves = rr.TimeColumn(TIMELINE, duration=block.t[due])
             self._send("synthesis", solves, 1e6 * block.synthesis_s[due, None])
+        self._send_phases(block)
         self._send_scene(block, history)
 
     def _send(self, path: str, time: rr.TimeColumn, values: Array) -> None:
         rows, series = values.shape
         columns = rr.Scalars.columns(scalars=values.ravel()).partition([series] * rows)
         self._recording.send_columns(f"plots/{path}", [time], columns)
+
+    def _send_phases(self, block: Trace) -> None:
+        """Marks the rows at which a phase begins."""
+        before = np.concatenate([[self._phase], block.phase[:-1]])
+        begun = np.flatnonzero(block.phase != before)
+        self._phase = float(block.phase[-1])
+        if begun.size:
+            time = rr.TimeColumn(TIMELINE, duration=block.t[begun])
+            names = [self._scenario.phases[int(index)].name for index in block.phase[begun]]
+            self._recording.send_columns("phase", [time], rr.StateChange.columns(state=names))
 
     def _send_scene(self, block: Trace, history: ContactHistory) -> None:
         first = -round(block.t[0] / self._scenario.physics.timestep) % self._stride
