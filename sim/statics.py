@@ -6,6 +6,8 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from sim.contacts import ContactFrames, contacts
+from sim.ik import plan_joints
+from sim.path import ScrewPath
 from sim.robot import RobotModel
 from sim.scenario import GRAVITY, Scenario
 from sim.settings import Control
@@ -16,7 +18,8 @@ from synthesis.contact import Array
 class Statics:
     """The scenario's nominal object, contacts and robot as problems of the form (17)."""
 
-    def __init__(self, scenario: Scenario, control: Control, robot: RobotModel) -> None:
+    def __init__(self, scenario: Scenario, control: Control, robot: RobotModel | None) -> None:
+        """Takes over the nominal scenario; without a robot the problems have no joints."""
         self._robot = robot
         self._objective = control.objective
         self._contacts = contacts(scenario, control)
@@ -31,11 +34,38 @@ class Statics:
         R_OC = self._frames.in_object(R_WO)
         p_WC = self._frames.points(R_WO, p_WO)
         weight_O = R_WO.T @ self._weight_W
+        n = self._hands
         return Problem(
             contacts=self._contacts,
             R_OC=R_OC,
             p_OC_O=self._frames.p_OC_O,
             w_ext_O=np.concatenate([weight_O, np.cross(self._center_O, weight_O)]),
-            joints=self._robot.statics(p_WC[: self._hands], R_WO @ R_OC[: self._hands]),
+            joints=None if self._robot is None else self._robot.statics(p_WC[:n], R_WO @ R_OC[:n]),
             objective=self._objective,
         )
+
+
+class HoldingProblems:
+    """The problems (17) of a scenario at the tilts of its path, the arms in their planned posture.
+
+    Args:
+        scenario: The scene.
+        control: What the synthesis is told: friction factor, preload, objective.
+        with_joints: Whether the arms are part of the problem: (15) and (16).
+
+    Raises:
+        PathError: The arms cannot follow the path.
+    """
+
+    def __init__(self, scenario: Scenario, control: Control, with_joints: bool = True) -> None:
+        self._path = ScrewPath(scenario.path)
+        self._robot = RobotModel(scenario) if with_joints else None
+        self._joints = plan_joints(scenario) if with_joints else None
+        self._statics = Statics(scenario, control, self._robot)
+
+    def at(self, tilt: float) -> Problem:
+        """The problem at a tilt [rad]."""
+        if self._robot is not None and self._joints is not None:
+            self._robot.update(self._joints.holding(tilt))
+        R_WO, p_WO = self._path.pose(tilt)
+        return self._statics.problem(p_WO, Rotation.from_matrix(R_WO).as_quat(scalar_first=True))

@@ -1,0 +1,75 @@
+"""The paper's two examples as problems over the tilt."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from scenarios import scenario
+from scenarios.box_tilt import HEIGHT
+from scenarios.cylinder_tilt import LENGTH as CYLINDER_LENGTH
+from sim.scenario import Scenario
+from sim.statics import HoldingProblems
+from synthesis import InfeasibleError, Objective, Solution, Synthesizer
+from synthesis.contact import Array, N
+
+FORCE_OBJECTIVES = {
+    "GFOP max": Objective.MAX_NORMAL_FORCE,
+    "GFOP norm": Objective.NORM_NORMAL_FORCE,
+}
+TORQUE_OBJECTIVES = {"TOP max": Objective.MAX_TORQUE, "TOP norm": Objective.NORM_TORQUE}
+PAPER_TILT_DEG = 85.0  # of the cylinder, where its figures end
+
+
+@dataclass(frozen=True, eq=False)
+class Sweep:
+    """Solutions of one problem family over the tilt, as far as it is feasible.
+
+    Attributes:
+        tilt_deg: (k,).
+        normal: Normal forces of all contacts [N], (k, m).
+        torque: Largest |torque| [N·m], (k,); zero without joints.
+        solve_s: Wall time of each whole solve [s], (k,).
+    """
+
+    tilt_deg: Array
+    normal: Array
+    torque: Array
+    solve_s: Array
+
+
+def sweep(problems: HoldingProblems, tilts_deg: Iterable[float]) -> Sweep:
+    """Solves the problems at the tilts, leaving out the infeasible ones."""
+    synthesizer = Synthesizer()
+    rows: list[tuple[float, Solution]] = []
+    for tilt_deg in tilts_deg:
+        try:
+            rows.append((tilt_deg, synthesizer.solve(problems.at(np.radians(tilt_deg)))))
+        except InfeasibleError:
+            continue
+    return Sweep(
+        tilt_deg=np.array([tilt for tilt, _ in rows]),
+        normal=np.array([solution.w_OC_C[:, N] for _, solution in rows]),
+        torque=np.array([np.abs(solution.tau).max(initial=0.0) for _, solution in rows]),
+        solve_s=np.array([solution.solve_s for _, solution in rows]),
+    )
+
+
+def paper_cylinder() -> Scenario:
+    """The cylinder as the paper's figures need it: fingers at the very rim, tilted to 90 deg."""
+    tilted = scenario("cylinder-tilt")
+    at_rim = tuple(
+        replace(hand, p_OC_O=(CYLINDER_LENGTH / 2, *hand.p_OC_O[1:])) for hand in tilted.hands
+    )
+    return replace(tilted, hands=at_rim, path=replace(tilted.path, angle_deg=90.0))
+
+
+def paper_box(up: float) -> Scenario:
+    """The box with its hand contacts at a height above the edge [m]."""
+    tilted = scenario("box-tilt")
+    hands = tuple(
+        replace(hand, p_OC_O=(*hand.p_OC_O[:2], up - HEIGHT / 2)) for hand in tilted.hands
+    )
+    return replace(tilted, hands=hands)

@@ -1,0 +1,192 @@
+"""The paper's figures 5 to 8 and every number it states, computed, measured and compared."""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+
+from scenarios import scenario
+from scenarios.paper.cases import (
+    FORCE_OBJECTIVES,
+    PAPER_TILT_DEG,
+    TORQUE_OBJECTIVES,
+    Sweep,
+    paper_cylinder,
+    sweep,
+)
+from scenarios.paper.figures import Curve, Figure, draw
+from scenarios.paper.statements import Statement, all_statements
+from sim.run import Request, Result, execute
+from sim.scenario import Scenario
+from sim.settings import controllers
+from sim.statics import HoldingProblems
+from synthesis import Objective
+from synthesis.contact import N
+
+Step = Callable[[str], None]
+
+
+def reproduce(out: Path, step: Step) -> list[Statement]:
+    """Computes, runs, draws and compares; writes figures (PNG, CSV) and ``paper.json``.
+
+    Args:
+        out: Folder to write.
+        step: Called with a line of words at the start of every step.
+    """
+    box, cylinder = scenario("box-tilt"), paper_cylinder()
+    exact_box, exact_cylinder = (controllers(s.control)["paper"] for s in (box, cylinder))
+    step("box: GFOP and TOP over the tilt")
+    box_tilts = np.arange(0.0, 90.5, 1.0)
+    box_sweeps = {
+        name: sweep(HoldingProblems(box, replace(exact_box, objective=objective)), box_tilts)
+        for name, objective in (FORCE_OBJECTIVES | TORQUE_OBJECTIVES).items()
+    }
+    step("cylinder: GFOP over the tilt")
+    cylinder_tilts = np.arange(0.0, PAPER_TILT_DEG + 0.5, 1.0)
+    cylinder_sweeps = {
+        name: sweep(
+            HoldingProblems(cylinder, replace(exact_cylinder, objective=objective), False),
+            cylinder_tilts,
+        )
+        for name, objective in FORCE_OBJECTIVES.items()
+    }
+    step("closed loop: box, least grip")
+    loops = {"GFOP": closed_loop(box, box.control.objective)}
+    step("closed loop: box, least torque")
+    loops["TOP"] = closed_loop(box, Objective.MAX_TORQUE)
+    step("closed loop: cylinder")
+    loops["cylinder"] = closed_loop(scenario("cylinder-tilt"), Objective.MAX_NORMAL_FORCE)
+    step("figures")
+    for figure in (
+        *_cylinder_figures(cylinder_sweeps, loops["cylinder"]),
+        *_box_figures(box_sweeps, loops["GFOP"], loops["TOP"]),
+    ):
+        draw(figure, out)
+    step("numbers")
+    statements = all_statements(box_sweeps, cylinder_sweeps)
+    table = [dataclasses.asdict(statement) for statement in statements]
+    (out / "paper.json").write_text(json.dumps(table, indent=2, allow_nan=False) + "\n")
+    return statements
+
+
+@dataclass(frozen=True, eq=False)
+class Loop:
+    """What a closed loop measured over the tilt, and the same computed for the same problem."""
+
+    measured: Sweep
+    computed: Sweep
+    result: Result
+
+
+def closed_loop(chosen: Scenario, objective: Objective) -> Loop:
+    """Runs a scenario with its own control, and computes its problem at the same tilts."""
+    control = replace(chosen.control, objective=objective)
+    result = execute(Request(chosen, "margin", control))
+    trace, history = result.trace, result.history
+    tilting = [i for i, p in enumerate(chosen.phases) if p.name == "tilt"]
+    rows = np.flatnonzero(np.isin(trace.phase, tilting))[::20]
+    measured = Sweep(
+        tilt_deg=np.degrees(trace.tilt[rows]),
+        normal=history.w_OC_C[rows][..., N],
+        torque=np.abs(trace.tau[rows]).max(axis=1),
+        solve_s=trace.synthesis_s[rows],
+    )
+    end = chosen.path.angle_deg
+    computed = sweep(HoldingProblems(chosen, control), np.linspace(0.0, end, round(end) + 1))
+    return Loop(measured, computed, result)
+
+
+def grip_error(loop: Loop, contact: int) -> float:
+    """RMS of measured minus computed normal force over the peak of the computed one [-]."""
+    expected = np.interp(
+        loop.measured.tilt_deg, loop.computed.tilt_deg, loop.computed.normal[:, contact]
+    )
+    error = loop.measured.normal[:, contact] - expected
+    return float(np.sqrt(np.mean(error**2)) / loop.computed.normal[:, contact].max())
+
+
+def _curves(sweeps: dict[str, Sweep], contacts: dict[str, int]) -> list[Curve]:
+    return [
+        Curve(f"{name}, {contact}", s.tilt_deg, s.normal[:, index])
+        for name, s in sweeps.items()
+        for contact, index in contacts.items()
+    ]
+
+
+def _loop_curves(name: str, loop: Loop, contacts: dict[str, int]) -> list[Curve]:
+    curves = []
+    for contact, index in contacts.items():
+        computed, measured = loop.computed, loop.measured
+        curves += [
+            Curve(
+                f"{name} with margin, {contact}", computed.tilt_deg, computed.normal[:, index], "--"
+            ),
+            Curve(
+                f"{name} closed loop, {contact}", measured.tilt_deg, measured.normal[:, index], "."
+            ),
+        ]
+    return curves
+
+
+def _cylinder_figures(sweeps: dict[str, Sweep], loop: Loop) -> list[Figure]:
+    caption = (
+        "Cylinder of Table I: 30 N, 0.36/0.30 x 0.5 m, mu_E 0.2, mu_C 0.15, e_n 0.25 m, grip at "
+        "most 30 N, fingers at the rim of the upper wall. With margin and in closed loop: fingers "
+        "0.02 m inside, 80 % of the friction, preload."
+    )
+    fingers = {"f_n1 (outer)": 0, "f_n2 (inner)": 1}
+    rim = {"f_En": 2}
+    return [
+        Figure(
+            "figure-5a",
+            "Finger forces",
+            "normal force [N]",
+            caption,
+            tuple(_curves(sweeps, fingers) + _loop_curves("GFOP", loop, fingers)),
+        ),
+        Figure(
+            "figure-5b",
+            "Environment force",
+            "normal force [N]",
+            caption,
+            tuple(_curves(sweeps, rim) + _loop_curves("GFOP", loop, rim)),
+        ),
+    ]
+
+
+def _box_figures(sweeps: dict[str, Sweep], gfop: Loop, top: Loop) -> list[Figure]:
+    caption = (
+        "Box of Table II: 20 N, 0.3 x 0.2 x 0.1 m, mu_E 0.25, mu_C 0.1, e_n 0.5 m, hands 0.225 m "
+        "along and 0.05 m up from the edge, Baxter's limits. With margin and in closed loop: 80 % "
+        "of the friction, preload 5 N."
+    )
+    loops = {"GFOP": gfop, "TOP": top}
+    kinds = {"GFOP": FORCE_OBJECTIVES, "TOP": TORQUE_OBJECTIVES}
+    figures = []
+    for number, what, contacts in (
+        ("6", "Hand forces", {"left": 0, "right": 1}),
+        ("7", "Environment forces", {"edge left": 2, "edge right": 3}),
+    ):
+        for letter, (kind, loop) in zip("ab", loops.items(), strict=True):
+            own = {name: sweeps[name] for name in kinds[kind]}
+            curves = _curves(own, contacts) + _loop_curves(kind, loop, contacts)
+            title = f"{what}, {kind}"
+            figures.append(
+                Figure(
+                    f"figure-{number}{letter}", title, "normal force [N]", caption, tuple(curves)
+                )
+            )
+    torque = [Curve(name, s.tilt_deg, s.torque) for name, s in sweeps.items()]
+    for kind, loop in loops.items():
+        torque += [
+            Curve(f"{kind} with margin", loop.computed.tilt_deg, loop.computed.torque, "--"),
+            Curve(f"{kind} closed loop", loop.measured.tilt_deg, loop.measured.torque, "."),
+        ]
+    title = "Largest joint torque"
+    figures.append(Figure("figure-8", title, "|torque| [N m]", caption, tuple(torque)))
+    return figures
