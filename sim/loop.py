@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 import numpy as np
+from dm_control.rl.control import PhysicsError
 
 from sim.contacts import ContactFrames
 from sim.controller import Controller
@@ -15,9 +16,17 @@ from sim.robot import RobotModel
 from sim.scenario import Scenario
 from sim.settings import Control
 from sim.trace import Trace
+from synthesis import FulcrumError
 
 # Steps per block that is handed on while the loop runs [s]; what an abrupt end may lose.
 _BLOCK_S = 0.1
+
+
+class DivergedError(FulcrumError):
+    """The simulation's state has left what numbers can hold."""
+
+    def __init__(self, t: float) -> None:
+        super().__init__(f"the simulation diverged at {t:.3f} s; check the scenario's physics.")
 
 
 class ClosedLoop:
@@ -70,24 +79,36 @@ class ClosedLoop:
         return self._plant.collisions
 
     def run(self) -> Iterator[Trace]:
-        """Steps to the end, handing over each block of rows as soon as it is full."""
+        """Steps to the end, handing over each block of rows as soon as it is full.
+
+        Raises:
+            DivergedError: The simulation has diverged; the rows before it have been handed over.
+        """
         while self.steps < self.total_steps:
             start = self.steps
             stop = min(start + self._block, self.total_steps)
+            diverged: PhysicsError | None = None
             for row in range(start, stop):
-                self._step(row)
+                try:
+                    self._step(row)
+                except PhysicsError as error:
+                    diverged = error
+                    break
                 self.steps = row + 1
-            block = self.trace.rows(start, stop)
-            block.tilt[:] = self._path.tilt(block.quat_WO)
-            yield block
+            block = self.trace.rows(start, self.steps)
+            if len(block):
+                block.tilt[:] = self._path.tilt(block.quat_WO)
+                yield block
+            if diverged is not None:
+                raise DivergedError(float(self.trace.t[self.steps])) from diverged
 
     def _step(self, row: int) -> None:
         trace, plant = self.trace, self._plant
         measurement = plant.measure()
+        self._write_state(row, measurement)
         command = self._controller.command(measurement)
         plant.apply(command.tau)
         plant.step()
-        self._write_state(row, measurement)
         trace.phase[row] = command.phase
         trace.q_ref[row], trace.tilt_ref[row] = command.q_ref, command.tilt_ref
         trace.tau[row], trace.saturated[row] = command.tau, command.saturated

@@ -233,7 +233,8 @@ class Judge:
             allowed = f"more than the allowed {limits.slip_mm:g} mm"
             if slip.any():
                 text = (
-                    f"Contact {name} slipped {allowed} at {{when}}; {contact.slip_mm:.3g} in all."
+                    f"Contact {name} slipped {allowed} at {{when}}; "
+                    f"{contact.slip_mm:.3g} mm in all."
                 )
                 failures.append(_failure(trace, slip, text))
             elif slide.any():

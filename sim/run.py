@@ -13,9 +13,7 @@ from pathlib import Path
 from types import FrameType
 from typing import Any
 
-from dm_control.rl.control import PhysicsError
-
-from sim.loop import ClosedLoop
+from sim.loop import ClosedLoop, DivergedError
 from sim.monitor import ContactHistory, Monitor
 from sim.recording import Recorder, open_viewer
 from sim.report import Judge, Report, RunInfo
@@ -69,6 +67,7 @@ def execute(request: Request, progress: Progress | None = None) -> Result:
     Raises:
         PathError: The arms cannot follow the path; nothing has moved.
         InvalidInputError: The scenario contradicts itself.
+        DivergedError: The simulation diverged in its first step.
     """
     scenario, out = request.scenario, request.out
     loop = ClosedLoop(scenario, request.control, seed=request.seed)
@@ -76,19 +75,19 @@ def execute(request: Request, progress: Progress | None = None) -> Result:
     robot = loop.robot
     judge = Judge(scenario, robot.joints, robot.tau_min, robot.tau_max)
     recorder = None
-    if out is not None:
-        viewer_url = open_viewer() if request.live else None
-        out.mkdir(parents=True, exist_ok=True)
-        config = resolved_config(request)
-        _write_json(out / CONFIG, config)
-        limits = robot.tau_min, robot.tau_max
-        recorder = Recorder(
-            out / RECORDING, scenario, config, robot.joints, *limits, viewer_url=viewer_url
-        )
     histories: list[ContactHistory] = []
     error: str | None = None
-    started = time.perf_counter()
-    with _StopSignal() as stop:
+    viewer_url = open_viewer() if request.live and out is not None else None
+    with _StopSignal() as stop:  # from the first file to the last, so that none is missing
+        if out is not None:
+            out.mkdir(parents=True, exist_ok=True)
+            config = resolved_config(request)
+            _write_json(out / CONFIG, config)
+            limits = robot.tau_min, robot.tau_max
+            recorder = Recorder(
+                out / RECORDING, scenario, config, robot.joints, *limits, viewer_url=viewer_url
+            )
+        started = time.perf_counter()
         try:
             for block in loop.run():
                 histories.append(monitor.update(block))
@@ -98,24 +97,26 @@ def execute(request: Request, progress: Progress | None = None) -> Result:
                     progress(loop.steps, loop.total_steps)
                 if stop.requested:
                     break
-        except PhysicsError as diverged:
-            error = f"The simulation diverged at {loop.steps} steps: {diverged}."
-    info = RunInfo(
-        controller=request.controller,
-        objective=request.control.objective,
-        seed=request.seed,
-        wall_s=time.perf_counter() - started,
-        interrupted=stop.requested,
-        error=error,
-        recording=None if out is None else RECORDING,
-        collisions=loop.collisions,
-    )
-    history = ContactHistory.concatenate(histories)
-    trace = loop.trace.rows(0, len(history.kept))
-    report = judge.report(info, trace, history)
-    if out is not None and recorder is not None:
-        _write_json(out / REPORT, dataclasses.asdict(report))
-        recorder.close(markdown(report))
+        except DivergedError as diverged:
+            if not histories:
+                raise
+            error = f"{diverged}"
+        info = RunInfo(
+            controller=request.controller,
+            objective=request.control.objective,
+            seed=request.seed,
+            wall_s=time.perf_counter() - started,
+            interrupted=stop.requested,
+            error=error,
+            recording=None if out is None else RECORDING,
+            collisions=loop.collisions,
+        )
+        history = ContactHistory.concatenate(histories)
+        trace = loop.trace.rows(0, len(history.kept))
+        report = judge.report(info, trace, history)
+        if out is not None and recorder is not None:
+            _write_json(out / REPORT, dataclasses.asdict(report))
+            recorder.close(markdown(report))
     return Result(report, trace, history)
 
 

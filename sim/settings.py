@@ -7,6 +7,9 @@ from dataclasses import dataclass, replace
 
 from synthesis import InvalidInputError, Objective
 
+# A trace takes about 2 kB per step: a gigabyte in this time [s].
+_LONGEST_S = 600.0
+
 
 @dataclass(frozen=True)
 class Phase:
@@ -28,8 +31,9 @@ class Phase:
 
     def __post_init__(self) -> None:
         where = f"phase {self.name}"
-        if not (math.isfinite(self.duration_s) and self.duration_s > 0.0):
-            raise InvalidInputError(f"{where}.duration_s", self.duration_s, "a finite time > 0 s")
+        if not 0.0 < self.duration_s <= _LONGEST_S:
+            valid = f"a duration > 0 s and <= {_LONGEST_S:g} s"
+            raise InvalidInputError(f"{where}.duration_s", self.duration_s, valid)
         for field in ("tilt", "grip"):
             if not 0.0 <= getattr(self, field) <= 1.0:
                 raise InvalidInputError(f"{where}.{field}", getattr(self, field), "in [0, 1]")
