@@ -26,6 +26,8 @@ _ITERATIONS = 50
 _SOLVED = 1e-9
 # Gauss-Newton damping: small against the squared singular values of the task (> 0.01).
 _DAMPING = 1e-8
+# The same for joints that are to keep still: large against it, so that the others move instead.
+_STILL_DAMPING = 1e-2
 # Clearance that links keep from each other and from the scene, and from where they look out [m].
 _CLEARANCE, _DETECTION = 0.005, 0.05
 # How near to a limit counts as being at it [rad, m, or share of the speed limit].
@@ -92,6 +94,9 @@ class _Follower:
             mink.FrameTask(tip_site(hand), "site", position_cost=1.0, orientation_cost=1.0)
             for hand in scenario.hands
         ]
+        still = np.zeros(model.nv)
+        still[[model.joint(name).dofadr[0] for name in scenario.robot.still]] = 1.0
+        self._damping = mink.DampingTask(model, np.sqrt(_STILL_DAMPING) * still)
         self._radii = [float(model.geom(tip_geom(hand)).size[0]) for hand in scenario.hands]
         self._motor_dofs = [int(model.actuator(i).trnid[0]) for i in range(model.nu)]
         self._qd_max = np.array(
@@ -140,8 +145,9 @@ class _Follower:
             if self._error() < _SOLVED:
                 break
             try:
+                tasks = [*self._tasks, self._damping]
                 velocity = mink.solve_ik(
-                    self._configuration, self._tasks, dt, "daqp", _DAMPING, limits=limits
+                    self._configuration, tasks, dt, "daqp", _DAMPING, limits=limits
                 )
             except mink.NoSolutionFound:
                 break
@@ -175,12 +181,13 @@ class _Follower:
         reasons = []
         for j in range(model.njnt):
             name, (low, high) = model.joint(j).name, model.jnt_range[j]
+            unit = "m" if model.jnt_type[j] == mujoco.mjtJoint.mjJNT_SLIDE else "rad"
             if too_fast[j]:
-                reasons.append(f"{name} at its speed limit {self._qd_max[j]:g} rad/s")
+                reasons.append(f"{name} at its speed limit {self._qd_max[j]:g} {unit}/s")
             if q[j] - low < _AT_LIMIT:
-                reasons.append(f"{name} at its lower limit {low:.3f} rad")
+                reasons.append(f"{name} at its lower limit {low:.3f} {unit}")
             if high - q[j] < _AT_LIMIT:
-                reasons.append(f"{name} at its upper limit {high:.3f} rad")
+                reasons.append(f"{name} at its upper limit {high:.3f} {unit}")
         near = sorted(
             (distance, first, second)
             for first, second in self._collisions.geom_id_pairs
@@ -210,7 +217,8 @@ class _Follower:
         pairs with at most three joints between them, and those that overlap in the start posture.
         """
         model, scenario = self._model, self._scenario
-        surroundings = [g.name for g in (*scenario.object.geoms, *scenario.environment)]
+        surroundings = {g.name: g for g in (*scenario.object.geoms, *scenario.environment)}
+        obstacles = [name for name, geom in surroundings.items() if geom.solid]
         links = [
             model.geom(g).name for g in range(model.ngeom) if model.geom(g).name not in surroundings
         ]
@@ -219,7 +227,7 @@ class _Follower:
         pairs = [
             ([link], [other])
             for link in moving
-            for other in surroundings
+            for other in obstacles
             if (link, other) not in touching
         ]
         for i, link in enumerate(moving):
