@@ -29,9 +29,9 @@ FINGER_LIMIT = 30.0  # [N]
 DEPTH = 0.02  # [m]
 
 # With the full friction and 30 N per finger equilibrium exists up to 84.4 deg, with 85 % of the
-# friction up to 78.1, with 80 % up to 76.2. The preload costs no range; without it a finger lets
-# go where the weight is over the rim (54.25 deg), and with less than 8 N the little that motion
-# adds to tangential forces (0.1 N) makes it slip.
+# friction up to 78.1, with 80 % up to 76.2. The preload costs no range. Without it the outer finger
+# does nothing below 54.25 deg, where the weight is over the rim, and lets go; with 5 N the 0.1 N
+# that motion adds to tangential forces takes it to 96 % of its friction.
 TILT_DEG = 77.0
 FRICTION_FACTOR, PRELOAD = 0.85, 10.0
 
