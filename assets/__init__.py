@@ -61,10 +61,10 @@ def description_path(relative: str) -> Path:
 
 
 def velocity_limits(model: mujoco.MjModel) -> dict[str, float]:
-    """Speed limits [rad/s] by joint name.
+    """Speed limits [rad/s or m/s] by joint name.
 
-    MJCF knows no speed limit of a joint; `baxter.xml` carries the official one as the first number
-    of the joint's `user` data, which stays with the joint when the robot is attached to a scene.
+    MJCF knows no speed limit of a joint; the robots here carry it as the first number of the
+    joint's `user` data, which stays with the joint when the robot is attached to a scene.
 
     Raises:
         ValueError: If the model's joints carry no user data.

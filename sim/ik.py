@@ -32,6 +32,8 @@ _DAMPING = 1e-8
 # Longest step of a joint while the start is sought [rad or m]: longer ones leave the region where
 # the task is linear, and an arm that is out of reach ends far from it, at limits of no concern.
 _START_STEP = 0.05
+# The same for joints that are to keep still: large against it, so that the others move instead.
+_STILL_DAMPING = 1e-2
 # Clearance that links keep from each other and from the scene, and from where they look out [m].
 _CLEARANCE, _DETECTION = 0.005, 0.05
 # How near to a limit counts as being at it [rad, m, or share of the speed limit].
@@ -127,6 +129,9 @@ class _Follower:
             mink.FrameTask(tip_site(hand), "site", position_cost=1.0, orientation_cost=1.0)
             for hand in scenario.hands
         ]
+        still = np.zeros(model.nv)
+        still[[model.joint(name).dofadr[0] for name in scenario.robot.still]] = 1.0
+        self._damping = mink.DampingTask(model, np.sqrt(_STILL_DAMPING) * still)
         self._radii = [float(model.geom(tip_geom(hand)).size[0]) for hand in scenario.hands]
         self._motor_dofs = [int(model.actuator(i).trnid[0]) for i in range(model.nu)]
         self._qd_max = np.array(
@@ -191,8 +196,9 @@ class _Follower:
             if self._error() < _SOLVED:
                 break
             try:
+                tasks = [*self._tasks, self._damping]
                 velocity = mink.solve_ik(
-                    self._configuration, self._tasks, dt, "daqp", _DAMPING, limits=limits
+                    self._configuration, tasks, dt, "daqp", _DAMPING, limits=limits
                 )
             except mink.NoSolutionFound:
                 break
@@ -226,12 +232,13 @@ class _Follower:
         reasons = []
         for j in range(model.njnt):
             name, (low, high) = model.joint(j).name, model.jnt_range[j]
+            unit = "m" if model.jnt_type[j] == mujoco.mjtJoint.mjJNT_SLIDE else "rad"
             if too_fast[j]:
-                reasons.append(f"{name} at its speed limit {self._qd_max[j]:g} rad/s")
+                reasons.append(f"{name} at its speed limit {self._qd_max[j]:g} {unit}/s")
             if q[j] - low < _AT_LIMIT:
-                reasons.append(f"{name} at its lower limit {low:.3f} rad")
+                reasons.append(f"{name} at its lower limit {low:.3f} {unit}")
             if high - q[j] < _AT_LIMIT:
-                reasons.append(f"{name} at its upper limit {high:.3f} rad")
+                reasons.append(f"{name} at its upper limit {high:.3f} {unit}")
         near = sorted(
             (distance, first, second)
             for first, second in self._collisions.geom_id_pairs

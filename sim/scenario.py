@@ -31,7 +31,8 @@ class Geom:
         kind: Geom type as MuJoCo names it: plane, sphere, capsule, ellipsoid, cylinder, box.
         size: Sizes as MuJoCo reads them (half extents; radius, half length) [m].
         pose: Pose in the frame of the owner (object or world).
-        rgba: Colour and opacity, each 0 to 1.
+        rgba: Colour and opacity, each 0 to 1; geoms of opacity 0 are not drawn.
+        solid: Whether the robot must keep clear of it (but for tips where they hold the object).
     """
 
     name: str
@@ -39,6 +40,7 @@ class Geom:
     size: tuple[float, ...]
     pose: Pose = Pose()
     rgba: tuple[float, float, float, float] = (0.6, 0.6, 0.6, 1.0)
+    solid: bool = True
 
 
 @dataclass(frozen=True)
@@ -137,6 +139,8 @@ class Robot:
         base: Pose of the model's root in the world.
         posture: Start angle [rad or m] of every joint that is driven, from which inverse
             kinematics seeks; the other joints are locked at 0.
+        still: Joints that move along the path only if the others cannot do it alone: the fingers
+            of a gripper, whose wrist carries them.
         start_deviation: Standard deviation of the start posture from the planned one [rad or m],
             drawn by the run's seed.
     """
@@ -144,6 +148,7 @@ class Robot:
     model: str
     posture: dict[str, float]
     description: str | None = None
+    still: tuple[str, ...] = ()
     base: Pose = Pose()
     start_deviation: float = 1e-4
 
@@ -168,6 +173,19 @@ class Pivot:
 
 
 @dataclass(frozen=True)
+class View:
+    """Where recordings look from, relative to the path's point [m].
+
+    Attributes:
+        eye: Where the eye stands.
+        target: What it looks at.
+    """
+
+    eye: Vector = (1.0, -0.5, 0.62)
+    target: Vector = (0.05, 0.0, 0.12)
+
+
+@dataclass(frozen=True)
 class Scenario:
     """Everything that a run needs to know; nothing else may distinguish one scene from another."""
 
@@ -184,6 +202,7 @@ class Scenario:
     control: Control = Control()
     physics: Physics = Physics()
     tolerances: Tolerances = Tolerances()
+    view: View = View()
 
     def __post_init__(self) -> None:
         geoms = [g.name for g in self.object.geoms]

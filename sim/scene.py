@@ -63,8 +63,8 @@ def tip_site(hand: Hand) -> str:
 
 
 def unwanted_pairs(scenario: Scenario, scene: mujoco.MjModel) -> list[tuple[str, str]]:
-    """Pairs of geoms that must not touch: moving links against object and environment."""
-    surroundings = [g.name for g in (*scenario.object.geoms, *scenario.environment)]
+    """Pairs of geoms that must not touch: moving links against solid object and environment."""
+    surroundings = {g.name: g for g in (*scenario.object.geoms, *scenario.environment)}
     touching = {(tip_geom(hand), hand.geom) for hand in scenario.hands}
     geoms = [scene.geom(g) for g in range(scene.ngeom)]
     links = [g.name for g in geoms if scene.body_weldid[g.bodyid[0]] != 0]
@@ -72,7 +72,7 @@ def unwanted_pairs(scenario: Scenario, scene: mujoco.MjModel) -> list[tuple[str,
         (link, other)
         for link in links
         for other in surroundings
-        if link not in surroundings and (link, other) not in touching
+        if link not in surroundings and (link, other) not in touching and surroundings[other].solid
     ]
 
 

@@ -8,8 +8,6 @@ from sim.scenario import Scenario
 from synthesis.contact import Array
 
 TIMELINE = "time"
-# Where the eye stands and looks, relative to the path's axis: in front, beside and above [m].
-_EYE, _TARGET = (1.0, -0.5, 0.62), (0.05, 0.0, 0.12)
 _BACKGROUND = (222, 226, 232)
 
 _CURVES = (
@@ -25,7 +23,8 @@ _CURVES = (
 
 def blueprint(scenario: Scenario, center: Array) -> rrb.Blueprint:
     """The layout for a scenario whose action is at a point in the world [m]."""
-    eye = rrb.EyeControls3D(position=center + _EYE, look_target=center + _TARGET)
+    view = scenario.view
+    eye = rrb.EyeControls3D(position=center + view.eye, look_target=center + view.target)
     scene = rrb.Spatial3DView(
         origin="/",
         contents=["/world/**", "/forces/**", "/cones/**"],

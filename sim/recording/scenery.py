@@ -49,6 +49,8 @@ class Scenery:
         own = {g.name for g in (*scenario.object.geoms, *scenario.environment)}
         hands = {self._model.body(hand_body(hand)).id for hand in scenario.hands}
         for g in range(self._model.ngeom):
+            if self._model.geom_rgba[g, 3] == 0.0:
+                continue
             is_own = self._model.geom(g).name in own or int(self._model.geom_bodyid[g]) in hands
             if is_own or (not self._visuals and self._model.geom_group[g] == 0):
                 yield g
