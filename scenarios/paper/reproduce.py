@@ -69,7 +69,7 @@ def reproduce(out: Path, step: Step) -> list[Statement]:
         draw(figure, out)
     step("numbers")
     statements = all_statements(box_sweeps, cylinder_sweeps)
-    table = [dataclasses.asdict(statement) for statement in statements]
+    table = [dataclasses.asdict(s) | {"reproduced": bool(s.reproduced)} for s in statements]
     (out / "paper.json").write_text(json.dumps(table, indent=2, allow_nan=False) + "\n")
     return statements
 
