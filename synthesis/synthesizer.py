@@ -47,7 +47,8 @@ _WORST_IMBALANCE = 1e-6
 _LOADED = 1e-6
 
 
-def _settings() -> clarabel.DefaultSettings:
+def solver_settings() -> clarabel.DefaultSettings:
+    """Quiet, single-threaded and tight; with the right to update the data."""
     settings = clarabel.DefaultSettings()
     settings.verbose = False
     settings.max_threads = 1
@@ -107,7 +108,7 @@ class _Compiled:
         self._rows = self._pattern.indices
         self._columns = np.repeat(np.arange(self.form.columns), np.diff(self._pattern.indptr))
         A, b = self.form.matrices(problem)
-        self._solver = self._build(A[self._rows, self._columns], b, _settings())
+        self._solver = self._build(A[self._rows, self._columns], b, solver_settings())
 
     def solve(self, problem: Problem, parameters: _Parameters = _Parameters()) -> Solution:
         """One conic solve; for the friction margin the value is lambda."""
@@ -140,7 +141,7 @@ class _Compiled:
         if self._decides(result, A, b):
             return result
         for regularisation in _FALLBACK_REGULARISATIONS:
-            settings = _settings()
+            settings = solver_settings()
             settings.equilibrate_enable = False
             settings.static_regularization_constant = regularisation
             result = self._build(data, b, settings).solve()

@@ -1,0 +1,73 @@
+"""The contact force synthesis problems along a scenario's path, without a simulation."""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from sim.ik import plan_joints
+from sim.path import Schedule, ScrewPath
+from sim.plant import Measurement
+from sim.robot import RobotModel
+from sim.scenario import GRAVITY, Scenario
+from sim.settings import Control
+from sim.statics import Statics
+from synthesis import InvalidInputError, Problem
+from synthesis.contact import Array
+from synthesis.sensitivity import Gravity
+
+
+class PathProblems:
+    """Object on its path, arms in the posture that inverse kinematics plans for it.
+
+    Attributes:
+        scenario: The scene.
+        end_deg: Tilt at the end of the path [deg].
+    """
+
+    def __init__(self, scenario: Scenario, control: Control) -> None:
+        """Plans the joint path.
+
+        Raises:
+            PathError: The arms cannot follow the path.
+        """
+        self.scenario = scenario
+        self._path = ScrewPath(scenario.path)
+        self.end_deg = float(np.degrees(self._path.end))
+        self._joint_path = plan_joints(
+            scenario, self._path, Schedule(scenario.timing, self._path.end)
+        )
+        self._statics = Statics(scenario, control, RobotModel(scenario))
+
+    def tilts(self, step_deg: float) -> Array:
+        """Evenly spaced tilts from start to end, at most a step apart [deg]."""
+        return np.linspace(0.0, self.end_deg, int(np.ceil(self.end_deg / step_deg - 1e-9)) + 1)
+
+    def problem(self, tilt_deg: float) -> Problem:
+        """The problem at a tilt [deg].
+
+        Raises:
+            InvalidInputError: The tilt is not on the path.
+        """
+        R_WO, p_WO = self._path.pose(self._tilt(tilt_deg))
+        q, _ = self._joint_path(np.radians(tilt_deg))
+        quat_WO = Rotation.from_matrix(R_WO).as_quat(scalar_first=True)
+        return self._statics.problem(Measurement(0.0, q, np.zeros_like(q), p_WO, quat_WO))
+
+    def gravity(self, tilt_deg: float) -> Gravity:
+        """The object's weight at a tilt [deg]."""
+        thing = self.scenario.object
+        return Gravity(
+            weight=thing.mass * GRAVITY,
+            direction_O=self.orientation(tilt_deg).T @ np.array([0.0, 0.0, -1.0]),
+            center_O=np.asarray(thing.center_of_mass),
+        )
+
+    def orientation(self, tilt_deg: float) -> Array:
+        """Orientation of the object at a tilt [deg], R_WO, (3, 3)."""
+        return self._path.pose(self._tilt(tilt_deg))[0]
+
+    def _tilt(self, tilt_deg: float) -> float:
+        if not 0.0 <= tilt_deg <= self.end_deg + 1e-9:
+            raise InvalidInputError("tilt", tilt_deg, f"from 0 to {self.end_deg:g} deg")
+        return float(np.radians(tilt_deg))
