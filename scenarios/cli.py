@@ -14,6 +14,15 @@ from typing import TYPE_CHECKING, Annotated
 
 import tyro
 
+from scenarios.commands import Capacity, Explain
+from scenarios.common import (
+    BAD_INPUT,
+    FAILED,
+    INTERRUPTED,
+    PASSED,
+    chosen_control,
+    progress_bar,
+)
 from synthesis.errors import FulcrumError, InvalidInputError
 
 if TYPE_CHECKING:
@@ -21,8 +30,6 @@ if TYPE_CHECKING:
     from sim.run import Request
 
 # Heavy packages are imported by the commands that need them: `fulcrum --help` answers at once.
-
-PASSED, FAILED, BAD_INPUT, INTERRUPTED = 0, 1, 2, 130
 
 
 @dataclass(frozen=True)
@@ -80,7 +87,7 @@ class Run:
 
         request = self._request()
         assert request.out is not None
-        with _progress(self.scenario) as progress:
+        with progress_bar(self.scenario) as progress:
             report = run(request, progress).report
         _print_report(report, request.out)
         codes = {Verdict.PASS: PASSED, Verdict.FAIL: FAILED, Verdict.INTERRUPTED: INTERRUPTED}
@@ -89,19 +96,9 @@ class Run:
     def _request(self) -> Request:
         from scenarios import scenario
         from sim.run import Request
-        from sim.settings import controllers
-        from synthesis.problem import Objective
 
         chosen = scenario(self.scenario)
-        known = controllers(chosen.control)
-        if self.controller not in known:
-            raise InvalidInputError("--controller", self.controller, f"one of {', '.join(known)}")
-        control = known[self.controller]
-        if self.objective is not None:
-            if self.objective not in list(Objective):
-                valid = f"one of {', '.join(Objective)}"
-                raise InvalidInputError("--objective", self.objective, valid)
-            control = replace(control, objective=Objective(self.objective))
+        control = chosen_control(chosen, self.controller, self.objective)
         if self.duration is not None:
             chosen = replace(chosen, timing=replace(chosen.timing, tilt_s=self.duration))
         if self.seed < 0:
@@ -161,6 +158,8 @@ Command = (
     | Annotated[Run, tyro.conf.subcommand("run")]
     | Annotated[Screenshot, tyro.conf.subcommand("screenshot")]
     | Annotated[View, tyro.conf.subcommand("view")]
+    | Annotated[Explain, tyro.conf.subcommand("explain")]
+    | Annotated[Capacity, tyro.conf.subcommand("capacity")]
 )
 
 
@@ -173,7 +172,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         return BAD_INPUT
 
 
-def _parse(arguments: Sequence[str] | None) -> List | Run | Screenshot | View:
+def _parse(arguments: Sequence[str] | None) -> List | Run | Screenshot | View | Explain | Capacity:
     """The command asked for; a parse error leaves as one line instead of tyro's box."""
     errors = io.StringIO()
     try:
@@ -191,19 +190,6 @@ _DESCRIPTION = (
     "Robots move objects too heavy to lift by leaning them on their surroundings: contact force "
     "synthesis in a MuJoCo closed loop, recorded and checked."
 )
-
-
-@contextlib.contextmanager
-def _progress(name: str):  # type: ignore[no-untyped-def]
-    """A progress bar with time left, on stderr; yields the function that moves it."""
-    from rich.console import Console
-    from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
-
-    columns = (TextColumn(name), BarColumn(), TextColumn("{task.percentage:3.0f} %"))
-    console = Console(stderr=True)
-    with Progress(*columns, TimeRemainingColumn(), console=console, transient=True) as bar:
-        task = bar.add_task(name, total=None)
-        yield lambda done, total: bar.update(task, completed=done, total=total)
 
 
 def _print_report(report: Report, out: Path) -> None:

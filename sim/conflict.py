@@ -67,10 +67,10 @@ class Conflict:
         text = (
             f"{balances} cannot be met within {limits}" if limits else f"{balances} cannot be met"
         )
-        asked = " and ".join(self.asked)
+        asked = and_list(list(self.asked)) + (" asks" if len(self.asked) == 1 else " ask")
         if not self.given:
-            return f"{text}: nothing there can give what {asked} ask for"
-        return f"{text}: at most {100 * self.bearable:.3g} % of what {asked} ask for can be given"
+            return f"{text}: nothing there can give what {asked} for"
+        return f"{text}: at most {100 * self.bearable:.3g} % of what {asked} for can be given"
 
 
 def conflict(certificate: Certificate, gravity: Gravity, R_WO: Array) -> Conflict:
@@ -192,7 +192,9 @@ def _kept(shares: dict[str, float]) -> dict[str, float]:
 
 
 def _list(shares: dict[str, float]) -> str:
-    words = [f"{name} ({100 * share:.3g} %)" for name, share in shares.items()]
-    return (
-        words[0] if len(words) == 1 else f"{', '.join(words[:-1])} and {words[-1]}" if words else ""
-    )
+    return and_list([f"{name} ({100 * share:.3g} %)" for name, share in shares.items()])
+
+
+def and_list(words: list[str]) -> str:
+    """Words as English lists them."""
+    return " and ".join(part for part in (", ".join(words[:-1]), *words[-1:]) if part)

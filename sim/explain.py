@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from sim.conflict import Conflict, conflict, tightest
+from sim.conflict import Conflict, and_list, conflict, tightest
 from sim.poses import PathProblems
 from synthesis import InfeasibleError, Solution, Synthesizer
 from synthesis.contact import N
@@ -42,6 +42,23 @@ class Remedy:
 
 
 @dataclass(frozen=True)
+class Influence:
+    """What a parameter does to the objective.
+
+    Attributes:
+        value: Of the parameter.
+        unit: Of the parameter.
+        slope: Derivative of the objective by it, in their units.
+        per_percent: Change of the objective per percent of the parameter [%].
+    """
+
+    value: float
+    unit: str
+    slope: float
+    per_percent: float
+
+
+@dataclass(frozen=True)
 class Optimum:
     """The optimal solution of a feasible problem.
 
@@ -51,7 +68,7 @@ class Optimum:
         normal_forces: Of each contact [N].
         active: Limits that are reached.
         sensitivities: Derivatives of the value.
-        elasticities: Change of the value in percent per percent of each parameter that matters.
+        influences: The parameters that matter, by name.
     """
 
     value: float
@@ -59,7 +76,7 @@ class Optimum:
     normal_forces: dict[str, float]
     active: tuple[str, ...]
     sensitivities: Sensitivities
-    elasticities: dict[str, float]
+    influences: dict[str, Influence]
 
 
 @dataclass(frozen=True)
@@ -128,7 +145,7 @@ def explain(problems: PathProblems, tilt_deg: float, synthesizer: Synthesizer) -
         blocked = None
         if change.conflict is not None:
             blocked = conflict(change.conflict, gravity, R_WO)
-        text = _words(change, blocked, problem, gravity, optimum is not None)
+        text = _words(change, problem, gravity)
         remedies[kind] = Remedy(
             change.outcome, change.factor, change.confirmed_within, text, blocked
         )
@@ -148,16 +165,15 @@ def explain(problems: PathProblems, tilt_deg: float, synthesizer: Synthesizer) -
 def _optimum(solution: Solution, gravity: Gravity) -> Optimum:
     problem = solution.problem
     slopes = sensitivities(solution, gravity)
-    parameters = [("weight", gravity.weight, slopes.weight)]
+    rows = [("weight", gravity.weight, "N", slopes.weight)]
     for c in problem.contacts:
-        bounds = (
-            ("friction", c.mu, slopes.friction),
-            ("preload", c.f_n_min, slopes.f_n_min),
-            ("grip limit", c.f_n_max, slopes.f_n_max),
-        )
-        parameters += [
-            (f"{what} of {c.name}", p, s[c.name]) for what, p, s in bounds if c.name in s
-        ]
+        for what, value, unit, by_name in (
+            ("friction", c.mu, "-", slopes.friction),
+            ("preload", c.f_n_min, "N", slopes.f_n_min),
+            ("grip limit", c.f_n_max, "N", slopes.f_n_max),
+        ):
+            if c.name in by_name:
+                rows.append((f"{what} of {c.name}", value, unit, by_name[c.name]))
     joints = problem.joints
     for k, name in enumerate(joints.names if joints else ()):
         assert joints is not None
@@ -166,7 +182,7 @@ def _optimum(solution: Solution, gravity: Gravity) -> Optimum:
             ("lower", joints.tau_min, slopes.tau_min),
         ):
             if name in s:
-                parameters.append((f"{what} torque limit of {name}", limits[k], s[name]))
+                rows.append((f"{what} torque limit of {name}", float(limits[k]), "N·m", s[name]))
     size = abs(solution.value) or 1.0
     return Optimum(
         value=solution.value,
@@ -176,10 +192,10 @@ def _optimum(solution: Solution, gravity: Gravity) -> Optimum:
         },
         active=_active(solution),
         sensitivities=slopes,
-        elasticities={
-            name: float(slope * parameter / size)
-            for name, parameter, slope in parameters
-            if abs(slope * parameter) > _ACTIVE * size
+        influences={
+            name: Influence(value, unit, slope, slope * value / size)
+            for name, value, unit, slope in rows
+            if abs(slope * value) > _ACTIVE * size
         },
     )
 
@@ -205,45 +221,36 @@ def _active(solution: Solution) -> tuple[str, ...]:
     return tuple(active)
 
 
-def _words(
-    change: Change, blocked: Conflict | None, problem: Problem, gravity: Gravity, feasible: bool
-) -> str:
+def _words(change: Change, problem: Problem, gravity: Gravity) -> str:
     """A change in a few words, with the numbers that it stands for."""
     kind, factor = change.kind, change.factor
     if change.outcome is Outcome.ABSENT:
         return f"no {kind}"
-    against = "" if blocked is None else f"; {_briefly(blocked)} in the way"
     if change.outcome is Outcome.NEVER:
-        reach = {
-            Kind.FRICTION: f"no friction helps, up to {factor:.4g} times",
-            Kind.TORQUE: "not even without torque limits",
-            Kind.WEIGHT: "not even without weight",
-            Kind.GRIP: "not even without grip limits",
+        return {
+            Kind.FRICTION: f"no friction helps (up to {factor:.4g} times)",
+            Kind.TORQUE: "does not help, not even without torque limits",
+            Kind.WEIGHT: "does not help, not even without weight",
+            Kind.GRIP: "does not help, not even without grip limits",
         }[kind]
-        return reach + against
     if change.outcome is Outcome.ALWAYS:
         if kind is Kind.WEIGHT:
             return "any weight"
         return f"down to {factor:.3g} times and less" if factor else "down to nothing"
-    direction = "up to" if factor > 1.0 else "down to"
+    text = f"{'up' if factor > 1.0 else 'down'} to {factor:.4g} times"
     if kind is Kind.WEIGHT:
-        text = f"{direction} {factor * gravity.weight:.4g} N ({factor:.4g} times)"
-    else:
-        text = f"{direction} {factor:.4g} times{_numbers(kind, problem, factor)}"
-    confirmed = "" if math.isfinite(change.confirmed_within) else " (not confirmed)"
-    return text + confirmed + (against if feasible else "")
+        text += f" ({factor * gravity.weight:.4g} N)"
+    elif kind is Kind.FRICTION:
+        text += _numbers({c.name: factor * c.mu for c in problem.contacts}, "")
+    elif kind is Kind.GRIP:
+        text += _numbers({c.name: factor * c.f_n_max for c in problem.contacts}, " N")
+    return text if math.isfinite(change.confirmed_within) else f"{text} (not confirmed)"
 
 
-def _numbers(kind: Kind, problem: Problem, factor: float) -> str:
-    if kind is Kind.TORQUE:
-        return ""
-    values = {c.name: c.mu if kind is Kind.FRICTION else c.f_n_max for c in problem.contacts}
-    finite = {name: v for name, v in values.items() if math.isfinite(v) and v > 0.0}
-    unit = "" if kind is Kind.FRICTION else " N"
-    return f" ({', '.join(f'{name} {factor * v:.4g}{unit}' for name, v in finite.items())})"
-
-
-def _briefly(blocked: Conflict) -> str:
-    """The heaviest limits of a conflict, or balances where no limit takes part."""
-    names = list(blocked.limits or blocked.balances)
-    return ", ".join(names[:4])
+def _numbers(values: dict[str, float], unit: str) -> str:
+    """Values by name, those that are equal together."""
+    names: dict[str, list[str]] = {}
+    for name, value in values.items():
+        if math.isfinite(value):
+            names.setdefault(f"{value:.4g}{unit}", []).append(name)
+    return f" ({'; '.join(f'{value} at {and_list(owners)}' for value, owners in names.items())})"

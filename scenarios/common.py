@@ -1,0 +1,71 @@
+"""What the commands share: exit codes, the choice of a controller, progress, JSON files."""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import math
+from collections.abc import Callable, Iterator
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from synthesis.errors import InvalidInputError
+
+if TYPE_CHECKING:
+    from sim.scenario import Scenario
+    from sim.settings import Control
+
+PASSED, FAILED, BAD_INPUT, INTERRUPTED = 0, 1, 2, 130
+
+
+def chosen_control(scenario: Scenario, controller: str, objective: str | None) -> Control:
+    """The scenario's control of a name, with another objective if one is given.
+
+    Raises:
+        InvalidInputError: There is no such controller or objective.
+    """
+    from sim.settings import controllers
+    from synthesis.problem import Objective
+
+    known = controllers(scenario.control)
+    if controller not in known:
+        raise InvalidInputError("--controller", controller, f"one of {', '.join(known)}")
+    control = known[controller]
+    if objective is None:
+        return control
+    if objective not in list(Objective):
+        raise InvalidInputError("--objective", objective, f"one of {', '.join(Objective)}")
+    return replace(control, objective=Objective(objective))
+
+
+@contextlib.contextmanager
+def progress_bar(name: str) -> Iterator[Callable[[int, int], None]]:
+    """A progress bar with time left, on stderr; yields the function that moves it."""
+    from rich.console import Console
+    from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
+
+    columns = (TextColumn(name), BarColumn(), TextColumn("{task.percentage:3.0f} %"))
+    console = Console(stderr=True)
+    with Progress(*columns, TimeRemainingColumn(), console=console, transient=True) as bar:
+        task = bar.add_task(name, total=None)
+        yield lambda done, total: bar.update(task, completed=done, total=total)
+
+
+def check_json(path: Path | None) -> None:
+    """Raises InvalidInputError before the work is done if a JSON file could not be written."""
+    if path is not None and (path.is_dir() or not path.parent.is_dir()):
+        raise InvalidInputError("--json", str(path), "a file in a folder that exists")
+
+
+def write_json(path: Path, content: dict[str, Any]) -> None:
+    """Writes a JSON file; infinite numbers become null."""
+    path.write_text(json.dumps(_finite(content), indent=2, allow_nan=False) + "\n")
+
+
+def _finite(value: Any) -> Any:
+    if isinstance(value, dict):
+        return {key: _finite(item) for key, item in value.items()}
+    if isinstance(value, (list, tuple)):
+        return [_finite(item) for item in value]
+    return None if isinstance(value, float) and not math.isfinite(value) else value
