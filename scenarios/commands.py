@@ -138,7 +138,7 @@ def _print_explanation(console: Console, explanation: Explanation, controller: s
     if explanation.conflict is not None:
         console.print(f"\n{explanation.conflict.sentence[0].upper()}", end="")
         console.print(f"{explanation.conflict.sentence[1:]}.", soft_wrap=True)
-        _print_conflict(console, explanation.conflict)
+        _print_conflict(console, explanation.conflict, explanation.gains)
     if explanation.optimum is not None:
         _print_optimum(console, explanation.optimum)
     from rich.box import SIMPLE
@@ -153,19 +153,29 @@ def _print_explanation(console: Console, explanation: Explanation, controller: s
     console.print(table)
 
 
-def _print_conflict(console: Console, conflict: Conflict) -> None:
+def _print_conflict(console: Console, conflict: Conflict, gains: dict[str, float]) -> None:
     from rich.box import SIMPLE
     from rich.markup import escape
     from rich.table import Table
 
-    table = Table("conflict", "share", "can give", box=SIMPLE)
-    table.add_row("", escape("[%]"), escape("[% of asked]"), style="dim")
+    from sim.explain import RELAXED
+
+    alone = f"alone {100 * RELAXED:.0f} % better"
+    table = Table("conflict", "share", "can give", alone, box=SIMPLE)
+    units = ("", "[%]", "[% of asked]", "[% more weight]")
+    table.add_row(*map(escape, units), style="dim")
     for name, share in conflict.balances.items():
-        table.add_row(name, f"{100 * share:.2f}", "")
+        table.add_row(name, f"{100 * share:.2f}")
     table.add_section()
     for name, share in conflict.limits.items():
         given = conflict.given.get(name)
-        table.add_row(name, f"{100 * share:.2f}", "" if given is None else f"{100 * given:.2f}")
+        gain = gains.get(name)
+        table.add_row(
+            name,
+            f"{100 * share:.2f}",
+            "" if given is None else f"{100 * given:.2f}",
+            "" if gain is None else f"{100 * gain:+.2f}",
+        )
     console.print(table)
 
 

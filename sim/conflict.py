@@ -8,6 +8,9 @@ motions in metres: rotations count at the arm of the contact that is farthest fr
 mass, joints as they move the hands. They are indications, not part of the proof; a share of zero is
 exact: such a constraint is not needed for it.
 
+Nor does a share say that relaxing that limit alone helps: where two hands squeeze, each one's
+torque limit can hold the other's grip back by itself (:func:`relaxed` serves to try).
+
 An infeasible problem has many proofs. The solver's own leans a little on everything; one from the
 border of feasibility (:mod:`synthesis.relaxation`) leans on what really holds the border.
 """
@@ -15,7 +18,7 @@ border of feasibility (:mod:`synthesis.relaxation`) leans on what really holds t
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -120,6 +123,27 @@ def tightest(
 def rebased(proof: Certificate, problem: Problem) -> Certificate:
     """The same multipliers for a problem with other loads and limits; may prove nothing there."""
     return make_certificate(problem, proof.multipliers)
+
+
+def relaxed(problem: Problem, share: float) -> dict[str, Problem]:
+    """The problem with one limit at a time relaxed by a share of it, by the limit's name."""
+    problems = {}
+    for i, contact in enumerate(problem.contacts):
+        for name, looser in (
+            ("friction", replace(contact, mu=(1.0 + share) * contact.mu)),
+            ("grip limit", replace(contact, f_n_max=(1.0 + share) * contact.f_n_max)),
+            ("preload", replace(contact, f_n_min=(1.0 - share) * contact.f_n_min)),
+        ):
+            contacts = (*problem.contacts[:i], looser, *problem.contacts[i + 1 :])
+            problems[f"{name} of {contact.name}"] = replace(problem, contacts=contacts)
+    joints = problem.joints
+    for k, name in enumerate(joints.names if joints else ()):
+        assert joints is not None
+        factor = np.ones(len(joints.names))
+        factor[k] += share
+        stronger = replace(joints, tau_min=factor * joints.tau_min, tau_max=factor * joints.tau_max)
+        problems[f"torque limit of {name}"] = replace(problem, joints=stronger)
+    return problems
 
 
 def _limit_motions(certificate: Certificate, arm: float) -> dict[str, float]:

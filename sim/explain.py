@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from sim.conflict import Conflict, and_list, conflict, tightest
+from sim.conflict import Conflict, and_list, conflict, relaxed, tightest
 from sim.poses import PathProblems
 from synthesis import InfeasibleError, Solution, Synthesizer
 from synthesis.contact import N
@@ -17,6 +17,8 @@ from synthesis.sensitivity import UNITS, Gravity, Sensitivities, sensitivities
 
 # Steps of the scan for the tightest tilt [deg].
 _SCAN_DEG = 5.0
+# By which share of it a limit is relaxed to see whether that helps.
+RELAXED = 0.1
 # How near to its limit, relative, a force, torque or utilisation counts as at it.
 _ACTIVE = 1e-6
 
@@ -91,6 +93,8 @@ class Explanation:
         weight: Of the object [N].
         feasible: Whether there are forces.
         conflict: Why not, of an infeasible problem.
+        gains: By how much more weight can be held [-] if one limit of the conflict alone is relaxed
+            by ``RELAXED``; of an infeasible problem that holds some weight.
         optimum: The solution of a feasible one.
         changes: By kind: what would help, or what is borne.
     """
@@ -102,6 +106,7 @@ class Explanation:
     weight: float
     feasible: bool
     conflict: Conflict | None
+    gains: dict[str, float]
     optimum: Optimum | None
     changes: dict[Kind, Remedy]
 
@@ -157,9 +162,26 @@ def explain(problems: PathProblems, tilt_deg: float, synthesizer: Synthesizer) -
         weight=gravity.weight,
         feasible=optimum is not None,
         conflict=why_not,
+        gains={} if why_not is None else _gains(problem, gravity, why_not, synthesizer),
         optimum=optimum,
         changes=remedies,
     )
+
+
+def _gains(
+    problem: Problem, gravity: Gravity, why_not: Conflict, synthesizer: Synthesizer
+) -> dict[str, float]:
+    try:
+        _, before = weight_range(problem, gravity, synthesizer)
+    except InfeasibleError:
+        return {}
+    if before == 0.0 or math.isinf(before):
+        return {}
+    return {
+        name: weight_range(looser, gravity, synthesizer)[1] / before - 1.0
+        for name, looser in relaxed(problem, RELAXED).items()
+        if name in why_not.limits
+    }
 
 
 def _optimum(solution: Solution, gravity: Gravity) -> Optimum:

@@ -1,15 +1,11 @@
 r"""How far a problem is from being feasible, or infeasible: the smallest change of a single kind.
 
 Four kinds of change are looked at, each by one factor k: all friction coefficients times k, all
-torque limits times k, the object's weight times k, all finite grip limits times k. The last three
-stand in the right-hand side of the conic form of :mod:`synthesis.conic` alone, which is then
-:math:`b_0 + k\, b_1`; the feasible factors are an interval, and its ends are the optima of two
-second-order cone programs:
-
-.. math:: \min \pm k \quad \text{s.t.}\quad A x - k\, b_1 + s = b_0,\ s \in \mathcal{K},\ k \ge 0
-
-Friction multiplies forces: the cones of a smaller factor lie within those of a larger one, so that
-feasibility is quasi-convex in it, and the smallest feasible factor is bisected.
+torque limits times k, the object's weight times k, all finite grip limits times k. The constraints
+are affine in the last three; their feasible factors are an interval, whose ends
+:mod:`synthesis.factor` computes. Friction multiplies forces: the cones of a smaller factor lie
+within those of a larger one, so that feasibility is quasi-convex in it, and the smallest feasible
+factor is bisected.
 
 Every factor found is confirmed: the changed problem is solved again a little to either side of it
 by the :class:`Synthesizer`, which has to find forces on the one and a certificate of infeasibility
@@ -23,17 +19,15 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 from enum import StrEnum
 
-import clarabel
 import numpy as np
-import scipy.sparse as sp
 
-from synthesis.conic import ConicForm
 from synthesis.contact import Array, ContactModel
 from synthesis.errors import InfeasibleError, SolverError
+from synthesis.factor import EmptyRangeError, factor_range
 from synthesis.problem import Objective, Problem
 from synthesis.sensitivity import Gravity
 from synthesis.solution import Certificate, shrink_cones
-from synthesis.synthesizer import Synthesizer, solver_settings
+from synthesis.synthesizer import Synthesizer
 
 # How far to either side of a factor it is confirmed, relative. The first is a thousand solver
 # tolerances; the others serve where forces are a hundred and more times the weight.
@@ -44,10 +38,6 @@ _BISECTED = 1e-7
 _FRICTION_STEP, _FRICTION_STEPS = 4.0, 5
 # The weight, over the given one, with which "any weight can be held" is confirmed.
 _MUCH_WEIGHT = 1e3
-# Linear factors below this are zero to the solver.
-_NO_FACTOR = 1e-8
-# Static regularisations [-] tried in turn: almost none where the default one stalls.
-_REGULARISATIONS = (None, 1e-12, 1e-6)
 
 
 class Kind(StrEnum):
@@ -143,15 +133,11 @@ def weight_range(
     """
     family = _weighted(_bare(problem), gravity)
     try:
-        low, high = _factor_range(family.at)
-    except _EmptyError:
+        low, high = factor_range(family.at)
+    except EmptyRangeError:
         synthesizer.solve(family.loosest)
         raise SolverError("PrimalInfeasible for all weights, but not for none") from None
     return low * gravity.weight, high * gravity.weight
-
-
-class _EmptyError(Exception):
-    """No factor at all is feasible."""
 
 
 @dataclass(frozen=True)
@@ -215,8 +201,8 @@ def _with_grip(problem: Problem) -> _Family:
 
 def _linear_change(kind: Kind, family: _Family, synthesizer: Synthesizer) -> Change:
     try:
-        low, high = _factor_range(family.at)
-    except _EmptyError:
+        low, high = factor_range(family.at)
+    except EmptyRangeError:
         conflict = _conflict(family.loosest, synthesizer)
         within = math.inf if conflict is None else 0.0
         return Change(kind, Outcome.NEVER, 1.0, within, conflict)
@@ -299,68 +285,3 @@ def _conflict(problem: Problem, synthesizer: Synthesizer) -> Certificate | None:
     except InfeasibleError as error:
         return error.certificate
     return None
-
-
-def _factor_range(at: Callable[[float], Problem]) -> tuple[float, float]:
-    """The least and the largest feasible factor >= 0; the largest may be infinite.
-
-    Args:
-        at: Problems of one structure, whose right-hand sides are affine in the factor.
-
-    Raises:
-        _EmptyError: No factor is feasible.
-        SolverError: The solver stopped without an answer.
-    """
-    program = _FactorProgram(at)
-    return program.extreme(1.0), program.extreme(-1.0)
-
-
-class _FactorProgram:
-    """The conic form with the factor in the place of the objective's auxiliary variable."""
-
-    def __init__(self, at: Callable[[float], Problem]) -> None:
-        problem, double = at(1.0), at(2.0)
-        form = ConicForm(problem)
-        unit = form.force_unit(problem)
-        A, b_1 = form.matrices(problem)
-        slope = form.matrices(double)[1] * form.force_unit(double) / unit - b_1
-        b_0 = b_1 - slope
-        A[:, form.aux_column] = -slope
-        scale = form.row_scale(np.maximum(np.abs(b_0), np.abs(slope)))
-        A, b_0 = A * scale[:, None], b_0 * scale
-        # The rows of the objective give way to one that keeps the factor >= 0.
-        positive = np.zeros((1, form.columns))
-        positive[0, form.aux_column] = -1.0
-        balance, cones = form.equilibrium_rows, form.cone_rows
-        bounds = slice(form.f_n_min_rows.start, form.tau_min_rows.stop)
-        self._A = sp.csc_matrix(np.vstack([A[balance], positive, A[bounds], A[cones]]))
-        self._b = np.concatenate([b_0[balance], [0.0], b_0[bounds], b_0[cones]])
-        self._cones = [
-            clarabel.ZeroConeT(6),
-            clarabel.NonnegativeConeT(1 + bounds.stop - bounds.start),
-            *(clarabel.SecondOrderConeT(width) for _, width in form.cones),
-        ]
-
-    def extreme(self, sign: float) -> float:
-        """The least (sign 1) or largest (sign -1) feasible factor; infinite where there is none."""
-        columns = self._A.shape[1]
-        P, q = sp.csc_matrix((columns, columns)), np.zeros(columns)
-        q[-1] = sign
-        status = ""
-        for regularisation in _REGULARISATIONS:
-            settings = solver_settings()
-            if regularisation is not None:
-                settings.equilibrate_enable = False
-                settings.static_regularization_constant = regularisation
-            solver = clarabel.DefaultSolver(P, q, self._A, self._b, self._cones, settings)
-            result = solver.solve()
-            status = str(result.status)
-            match status:
-                case "Solved" | "AlmostSolved":
-                    factor = float(result.x[-1])
-                    return factor if factor > _NO_FACTOR else 0.0
-                case "PrimalInfeasible":
-                    raise _EmptyError
-                case "DualInfeasible":
-                    return math.inf
-        raise SolverError(status)
