@@ -14,6 +14,15 @@ from typing import TYPE_CHECKING, Annotated
 
 import tyro
 
+from scenarios.commands import Capacity, Explain
+from scenarios.common import (
+    BAD_INPUT,
+    FAILED,
+    INTERRUPTED,
+    PASSED,
+    chosen_control,
+    progress_bar,
+)
 from synthesis.errors import FulcrumError, InvalidInputError
 
 if TYPE_CHECKING:
@@ -21,8 +30,6 @@ if TYPE_CHECKING:
     from sim.run import Request
 
 # Heavy packages are imported by the commands that need them: `fulcrum --help` answers at once.
-
-PASSED, FAILED, BAD_INPUT, INTERRUPTED = 0, 1, 2, 130
 
 
 @dataclass(frozen=True)
@@ -73,15 +80,27 @@ class Run:
     live: bool = False
     """Open a viewer that follows the run."""
 
+    anyway: bool = False
+    """Run with forces as near to balance as the limits allow where none balance the object."""
+
     def execute(self) -> int:
         """Does it; returns the exit code."""
+        from rich.console import Console
+
+        from scenarios.commands import print_explanation
         from sim.report import Verdict
+        from sim.run import UnholdableError
         from sim.run import execute as run
 
         request = self._request()
         assert request.out is not None
-        with _progress(self.scenario) as progress:
-            report = run(request, progress).report
+        try:
+            with progress_bar(self.scenario) as progress:
+                report = run(request, progress).report
+        except UnholdableError as error:
+            print_explanation(Console(highlight=False), error.explanation, self.controller)
+            print("Nothing has moved; --anyway shows what happens.")
+            return FAILED
         _print_report(report, request.out)
         codes = {Verdict.PASS: PASSED, Verdict.FAIL: FAILED, Verdict.INTERRUPTED: INTERRUPTED}
         return codes[report.verdict]
@@ -89,24 +108,19 @@ class Run:
     def _request(self) -> Request:
         from scenarios import scenario
         from sim.run import Request
-        from sim.settings import controllers, stretched
-        from synthesis.problem import Objective
+        from sim.settings import stretched
 
         chosen = scenario(self.scenario)
-        known = controllers(chosen.control)
-        if self.controller not in known:
-            raise InvalidInputError("--controller", self.controller, f"one of {', '.join(known)}")
-        control = known[self.controller]
-        if self.objective is not None:
-            if self.objective not in list(Objective):
-                valid = f"one of {', '.join(Objective)}"
-                raise InvalidInputError("--objective", self.objective, valid)
-            control = replace(control, objective=Objective(self.objective))
+        control = chosen_control(chosen, self.controller, self.objective)
         if self.duration is not None:
             chosen = replace(chosen, phases=stretched(chosen.phases, self.duration))
         if self.seed < 0:
             raise InvalidInputError("--seed", self.seed, "an integer >= 0")
-        return Request(chosen, self.controller, control, self.seed, self._out(), self.live)
+        if self.anyway:
+            control = replace(control, best_effort=True)
+        return Request(
+            chosen, self.controller, control, self.seed, self._out(), self.live, self.anyway
+        )
 
     def _out(self) -> Path:
         stamp = datetime.now().strftime("%Y%m%d-%H%M%S")
@@ -162,6 +176,8 @@ Command = (
     | Annotated[Run, tyro.conf.subcommand("run")]
     | Annotated[Screenshot, tyro.conf.subcommand("screenshot")]
     | Annotated[View, tyro.conf.subcommand("view")]
+    | Annotated[Explain, tyro.conf.subcommand("explain")]
+    | Annotated[Capacity, tyro.conf.subcommand("capacity")]
 )
 
 
@@ -180,7 +196,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         return INTERRUPTED
 
 
-def _parse(arguments: Sequence[str] | None) -> List | Run | Screenshot | View:
+def _parse(arguments: Sequence[str] | None) -> List | Run | Screenshot | View | Explain | Capacity:
     """The command asked for; a parse error leaves as one line instead of tyro's box."""
     errors = io.StringIO()
     try:
@@ -198,21 +214,6 @@ _DESCRIPTION = (
     "Robots move objects too heavy to lift by leaning them on their surroundings: contact force "
     "synthesis in a MuJoCo closed loop, recorded and checked."
 )
-
-
-@contextlib.contextmanager
-def _progress(name: str):  # type: ignore[no-untyped-def]
-    """A progress bar with time left, on stderr; yields the function that moves it."""
-    from rich.console import Console
-    from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
-
-    share, left = TextColumn("{task.percentage:3.0f} %"), TimeRemainingColumn()
-    columns = (TextColumn(name), BarColumn(), share, left)
-    console = Console(stderr=True)
-    quiet = not console.is_terminal
-    with Progress(*columns, console=console, transient=True, disable=quiet) as bar:
-        task = bar.add_task(name, total=None)
-        yield lambda done, total: bar.update(task, completed=done, total=total)
 
 
 def _print_report(report: Report, out: Path) -> None:

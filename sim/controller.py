@@ -21,7 +21,8 @@ from sim.robot import RobotModel
 from sim.scenario import Scenario
 from sim.settings import Control
 from sim.statics import Statics
-from synthesis import InfeasibleError, SolverError, Synthesizer, UnboundedError
+from synthesis import InfeasibleError, Solution, SolverError, Synthesizer, UnboundedError
+from synthesis.best_effort import BestEffort, best_effort
 from synthesis.contact import Array
 
 
@@ -107,11 +108,17 @@ class Controller:
         self._tau_g = self._robot.gravity()
 
     def _synthesize(self, measurement: Measurement) -> bool:
+        """Takes over the forces of a solution, if there is one; returns whether there was."""
+        problem = self._statics.problem(measurement.p_WO, measurement.quat_WO)
+        forces: Solution | BestEffort
         try:
-            problem = self._statics.problem(measurement.p_WO, measurement.quat_WO)
-            solution = self._synthesizer.solve(problem)
-        except (InfeasibleError, UnboundedError, SolverError):
+            forces, solved = self._synthesizer.solve(problem), True
+        except InfeasibleError:
+            if not self._control.best_effort:
+                return False
+            forces, solved = best_effort(problem), False
+        except (UnboundedError, SolverError):
             return False
-        self._w_OC_C = solution.w_OC_C
-        self._tau_f = solution.tau - self._tau_g
-        return True
+        self._w_OC_C = forces.w_OC_C
+        self._tau_f = forces.tau - self._tau_g
+        return solved

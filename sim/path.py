@@ -18,7 +18,8 @@ def rotation(pose: Pose) -> Rotation:
 class ScrewPath:
     r"""Poses of the object along :math:`X_{WO}(\theta) = e^{[S]\theta} X_{WO}(0)`.
 
-    S is the screw with the path's axis, point and pitch; the tilt :math:`\theta` is its angle.
+    S is the screw with the path's axis, point and pitch; the tilt :math:`\theta` is its angle. A
+    travel, which lifts the object off while it turns, is added in proportion to the tilt.
     """
 
     def __init__(self, pivot: Pivot) -> None:
@@ -28,6 +29,7 @@ class ScrewPath:
         for name, value in (
             ("point_W", pivot.point_W),
             ("pitch", pivot.pitch),
+            ("travel", pivot.travel),
             ("start.position", pivot.start.position),
             ("start.quaternion", pivot.start.quaternion),
         ):
@@ -39,6 +41,7 @@ class ScrewPath:
         self.end = float(np.radians(pivot.angle_deg))
         self._point = np.asarray(pivot.point_W, float)
         self._pitch = pivot.pitch
+        self._travel = np.asarray(pivot.travel, float)
         self._R_WO = rotation(pivot.start)
         self._p_WO = np.asarray(pivot.start.position, float)
 
@@ -46,7 +49,7 @@ class ScrewPath:
         """Orientation, (3, 3), and position [m], (3,), of the object at a tilt [rad]."""
         turn = Rotation.from_rotvec(tilt * self.axis)
         p_WO = self._point + turn.apply(self._p_WO - self._point) + self._pitch * tilt * self.axis
-        return (turn * self._R_WO).as_matrix(), p_WO
+        return (turn * self._R_WO).as_matrix(), p_WO + tilt / self.end * self._travel
 
     def tilt(self, quaternion: Array) -> Array:
         """Tilt [rad] of measured orientations, (..., 4) wxyz: their twist about the axis.

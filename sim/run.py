@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import dataclasses
-import json
-import math
 import signal
 import time
 from collections.abc import Callable
@@ -13,16 +11,23 @@ from pathlib import Path
 from types import FrameType
 from typing import Any
 
+from sim.explain import Explanation, explain
+from sim.files import finite, write_json
 from sim.loop import ClosedLoop, DivergedError
 from sim.monitor import ContactHistory, Monitor
+from sim.poses import PathProblems
 from sim.recording import Recorder, open_viewer
 from sim.report import Judge, Report, RunInfo
 from sim.scenario import Scenario
 from sim.settings import Control
 from sim.trace import Trace
+from synthesis import FulcrumError, InfeasibleError, Synthesizer
 
 RECORDING, CONFIG, REPORT = "run.rrd", "config.json", "report.json"
 _PACKAGES = ("mujoco", "dm-control", "mink", "pin", "clarabel", "rerun-sdk", "numpy", "scipy")
+
+# Steps at which the path is checked for forces before anything moves [deg].
+_CHECK_DEG = 5.0
 
 Progress = Callable[[int, int], None]
 
@@ -38,6 +43,7 @@ class Request:
         seed: Draws the small deviations of the start posture.
         out: Folder for recording, configuration and report; None writes nothing.
         live: Whether to open a viewer that follows the run (with ``out`` only).
+        anyway: Whether to run although the synthesis finds no forces somewhere on the path.
     """
 
     scenario: Scenario
@@ -46,6 +52,18 @@ class Request:
     seed: int = 0
     out: Path | None = None
     live: bool = False
+    anyway: bool = False
+
+
+class UnholdableError(FulcrumError):
+    """Somewhere on the path no forces hold the object within all limits; nothing has moved."""
+
+    def __init__(self, explanation: Explanation) -> None:
+        self.explanation = explanation
+        super().__init__(
+            f"{explanation.scenario} cannot be held at {explanation.tilt_deg:g} deg: "
+            f"{explanation.conflict.sentence if explanation.conflict else ''}."
+        )
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -67,9 +85,13 @@ def execute(request: Request, progress: Progress | None = None) -> Result:
     Raises:
         PathError: The arms cannot follow the path; nothing has moved.
         InvalidInputError: The scenario contradicts itself.
+        UnholdableError: The synthesis finds no forces somewhere on the path, and the request does
+            not say to run anyway.
         DivergedError: The simulation diverged in its first step.
     """
     scenario, out = request.scenario, request.out
+    if not request.anyway:
+        _check_feasible(scenario, request.control)
     loop = ClosedLoop(scenario, request.control, seed=request.seed)
     monitor = Monitor(scenario)
     robot = loop.robot
@@ -82,7 +104,7 @@ def execute(request: Request, progress: Progress | None = None) -> Result:
         if out is not None:
             out.mkdir(parents=True, exist_ok=True)
             config = resolved_config(request)
-            _write_json(out / CONFIG, config)
+            write_json(out / CONFIG, config)
             limits = robot.tau_min, robot.tau_max
             recorder = Recorder(
                 out / RECORDING, scenario, config, robot.joints, *limits, viewer_url=viewer_url
@@ -115,9 +137,18 @@ def execute(request: Request, progress: Progress | None = None) -> Result:
         trace = loop.trace.rows(0, len(history.kept))
         report = judge.report(info, trace, history)
         if out is not None and recorder is not None:
-            _write_json(out / REPORT, dataclasses.asdict(report))
+            write_json(out / REPORT, dataclasses.asdict(report))
             recorder.close(markdown(report))
     return Result(report, trace, history)
+
+
+def _check_feasible(scenario: Scenario, control: Control) -> None:
+    problems, synthesizer = PathProblems(scenario, control), Synthesizer()
+    for tilt in problems.tilts(_CHECK_DEG):
+        try:
+            synthesizer.solve(problems.problem(float(tilt)))
+        except InfeasibleError:
+            raise UnholdableError(explain(problems, float(tilt), synthesizer)) from None
 
 
 class _StopSignal:
@@ -142,7 +173,7 @@ class _StopSignal:
 
 def resolved_config(request: Request) -> dict[str, Any]:
     """Everything that determines the run, for JSON; infinite limits become null."""
-    return _finite(
+    return finite(
         {
             "controller": request.controller,
             "seed": request.seed,
@@ -151,18 +182,6 @@ def resolved_config(request: Request) -> dict[str, Any]:
             "versions": {name: version(name) for name in _PACKAGES},
         }
     )
-
-
-def _finite(value: Any) -> Any:
-    if isinstance(value, dict):
-        return {key: _finite(item) for key, item in value.items()}
-    if isinstance(value, (list, tuple)):
-        return [_finite(item) for item in value]
-    return None if isinstance(value, float) and not math.isfinite(value) else value
-
-
-def _write_json(path: Path, content: dict[str, Any]) -> None:
-    path.write_text(json.dumps(content, indent=2, allow_nan=False) + "\n")
 
 
 def markdown(report: Report) -> str:

@@ -163,6 +163,7 @@ class Pivot:
         axis_W: Direction of the axis; the tilt is positive by the right-hand rule.
         angle_deg: Tilt at the end [deg].
         pitch: Advance along the axis per radian [m].
+        travel: Translation on top of the screw, in proportion to the tilt, at the end [m].
     """
 
     start: Pose
@@ -170,6 +171,7 @@ class Pivot:
     axis_W: Vector
     angle_deg: float = 90.0
     pitch: float = 0.0
+    travel: Vector = (0.0, 0.0, 0.0)
 
 
 @dataclass(frozen=True)

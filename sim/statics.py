@@ -6,8 +6,6 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from sim.contacts import ContactFrames, contacts
-from sim.ik import plan_joints
-from sim.path import ScrewPath
 from sim.robot import RobotModel
 from sim.scenario import GRAVITY, Scenario
 from sim.settings import Control
@@ -43,29 +41,3 @@ class Statics:
             joints=None if self._robot is None else self._robot.statics(p_WC[:n], R_WO @ R_OC[:n]),
             objective=self._objective,
         )
-
-
-class HoldingProblems:
-    """The problems (17) of a scenario at the tilts of its path, the arms in their planned posture.
-
-    Args:
-        scenario: The scene.
-        control: What the synthesis is told: friction factor, preload, objective.
-        with_joints: Whether the arms are part of the problem: (15) and (16).
-
-    Raises:
-        PathError: The arms cannot follow the path.
-    """
-
-    def __init__(self, scenario: Scenario, control: Control, with_joints: bool = True) -> None:
-        self._path = ScrewPath(scenario.path)
-        self._robot = RobotModel(scenario) if with_joints else None
-        self._joints = plan_joints(scenario) if with_joints else None
-        self._statics = Statics(scenario, control, self._robot)
-
-    def at(self, tilt: float) -> Problem:
-        """The problem at a tilt [rad]."""
-        if self._robot is not None and self._joints is not None:
-            self._robot.update(self._joints.holding(tilt))
-        R_WO, p_WO = self._path.pose(tilt)
-        return self._statics.problem(p_WO, Rotation.from_matrix(R_WO).as_quat(scalar_first=True))

@@ -10,8 +10,8 @@ import numpy as np
 from scenarios import scenario
 from scenarios.box_tilt import HEIGHT
 from scenarios.cylinder_tilt import LENGTH as CYLINDER_LENGTH
+from sim.poses import PathProblems
 from sim.scenario import Scenario
-from sim.statics import HoldingProblems
 from synthesis import InfeasibleError, Objective, Solution, Synthesizer
 from synthesis.contact import Array, N
 
@@ -40,13 +40,13 @@ class Sweep:
     solve_s: Array
 
 
-def sweep(problems: HoldingProblems, tilts_deg: Iterable[float]) -> Sweep:
+def sweep(problems: PathProblems, tilts_deg: Iterable[float]) -> Sweep:
     """Solves the problems at the tilts, leaving out the infeasible ones."""
     synthesizer = Synthesizer()
     rows: list[tuple[float, Solution]] = []
     for tilt_deg in tilts_deg:
         try:
-            rows.append((tilt_deg, synthesizer.solve(problems.at(np.radians(tilt_deg)))))
+            rows.append((tilt_deg, synthesizer.solve(problems.problem(tilt_deg))))
         except InfeasibleError:
             continue
     return Sweep(

@@ -21,10 +21,10 @@ from scenarios.paper.cases import (
 )
 from scenarios.paper.figures import Curve, Figure, draw
 from scenarios.paper.statements import Statement, all_statements
+from sim.poses import PathProblems
 from sim.run import Request, Result, execute
 from sim.scenario import Scenario
 from sim.settings import controllers
-from sim.statics import HoldingProblems
 from synthesis import Objective
 from synthesis.contact import N
 
@@ -43,14 +43,14 @@ def reproduce(out: Path, step: Step) -> list[Statement]:
     step("box: GFOP and TOP over the tilt")
     box_tilts = np.arange(0.0, 90.5, 1.0)
     box_sweeps = {
-        name: sweep(HoldingProblems(box, replace(exact_box, objective=objective)), box_tilts)
+        name: sweep(PathProblems(box, replace(exact_box, objective=objective)), box_tilts)
         for name, objective in (FORCE_OBJECTIVES | TORQUE_OBJECTIVES).items()
     }
     step("cylinder: GFOP over the tilt")
     cylinder_tilts = np.arange(0.0, PAPER_TILT_DEG + 0.5, 1.0)
     cylinder_sweeps = {
         name: sweep(
-            HoldingProblems(cylinder, replace(exact_cylinder, objective=objective), False),
+            PathProblems(cylinder, replace(exact_cylinder, objective=objective), False),
             cylinder_tilts,
         )
         for name, objective in FORCE_OBJECTIVES.items()
@@ -97,7 +97,7 @@ def closed_loop(chosen: Scenario, objective: Objective) -> Loop:
         solve_s=trace.synthesis_s[rows],
     )
     end = chosen.path.angle_deg
-    computed = sweep(HoldingProblems(chosen, control), np.linspace(0.0, end, round(end) + 1))
+    computed = sweep(PathProblems(chosen, control), np.linspace(0.0, end, round(end) + 1))
     return Loop(measured, computed, result)
 
 

@@ -8,9 +8,9 @@ import numpy as np
 
 from scenarios import scenario
 from scenarios.paper.cases import Sweep, paper_box, paper_cylinder
+from sim.poses import PathProblems
 from sim.scenario import Friction, Scenario
 from sim.settings import controllers
-from sim.statics import HoldingProblems
 from synthesis import InfeasibleError, Problem, Synthesizer
 from synthesis.reference import solve_reference
 
@@ -41,7 +41,7 @@ _SAME = 0.005
 
 def _problem(chosen: Scenario, tilt_deg: float, with_joints: bool = False) -> Problem:
     control = controllers(chosen.control)["paper"]
-    return HoldingProblems(chosen, control, with_joints).at(float(np.radians(tilt_deg)))
+    return PathProblems(chosen, control, with_joints).problem(tilt_deg)
 
 
 def _value(chosen: Scenario, tilt_deg: float) -> float:

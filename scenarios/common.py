@@ -1,0 +1,58 @@
+"""What the commands share: exit codes, the choice of a controller, progress, output files."""
+
+from __future__ import annotations
+
+import contextlib
+from collections.abc import Callable, Iterator
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from synthesis.errors import InvalidInputError
+
+if TYPE_CHECKING:
+    from sim.scenario import Scenario
+    from sim.settings import Control
+
+PASSED, FAILED, BAD_INPUT, INTERRUPTED = 0, 1, 2, 130
+
+
+def chosen_control(scenario: Scenario, controller: str, objective: str | None) -> Control:
+    """The scenario's control of a name, with another objective if one is given.
+
+    Raises:
+        InvalidInputError: There is no such controller or objective.
+    """
+    from sim.settings import controllers
+    from synthesis.problem import Objective
+
+    known = controllers(scenario.control)
+    if controller not in known:
+        raise InvalidInputError("--controller", controller, f"one of {', '.join(known)}")
+    control = known[controller]
+    if objective is None:
+        return control
+    if objective not in list(Objective):
+        raise InvalidInputError("--objective", objective, f"one of {', '.join(Objective)}")
+    return replace(control, objective=Objective(objective))
+
+
+@contextlib.contextmanager
+def progress_bar(name: str) -> Iterator[Callable[[int, int], None]]:
+    """A progress bar with time left, on stderr; yields the function that moves it."""
+    from rich.console import Console
+    from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
+
+    share, left = TextColumn("{task.percentage:3.0f} %"), TimeRemainingColumn()
+    columns = (TextColumn(name), BarColumn(), share, left)
+    console = Console(stderr=True)
+    quiet = not console.is_terminal
+    with Progress(*columns, console=console, transient=True, disable=quiet) as bar:
+        task = bar.add_task(name, total=None)
+        yield lambda done, total: bar.update(task, completed=done, total=total)
+
+
+def check_json(path: Path | None) -> None:
+    """Raises InvalidInputError before the work is done if a JSON file could not be written."""
+    if path is not None and (path.is_dir() or not path.parent.is_dir()):
+        raise InvalidInputError("--json", str(path), "a file in a folder that exists")

@@ -1,0 +1,13 @@
+"""The gripper lifts the cylinder of Table I off while it turns it: infeasible in the paper, too."""
+
+from dataclasses import replace
+
+from scenarios.cylinder_tilt import SCENARIO as CYLINDER_TILT
+
+SCENARIO = replace(
+    CYLINDER_TILT,
+    name="cylinder-lift",
+    summary="The gripper lifts the cylinder off and turns it in the air (paper: infeasible)",
+    supports=(),
+    path=replace(CYLINDER_TILT.path, travel=(0.0, 0.0, 0.1)),
+)

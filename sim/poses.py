@@ -1,0 +1,77 @@
+"""The contact force synthesis problems along a scenario's path, without a simulation."""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from sim.ik import plan_joints
+from sim.path import ScrewPath
+from sim.robot import RobotModel
+from sim.scenario import GRAVITY, Scenario
+from sim.settings import Control
+from sim.statics import Statics
+from synthesis import InvalidInputError, Problem
+from synthesis.contact import Array
+from synthesis.sensitivity import Gravity
+
+
+class PathProblems:
+    """Object on its path, arms in the posture that inverse kinematics plans for it.
+
+    Attributes:
+        scenario: The scene.
+        end_deg: Tilt at the end of the path [deg].
+    """
+
+    def __init__(self, scenario: Scenario, control: Control, with_joints: bool = True) -> None:
+        """Plans the joint path.
+
+        Args:
+            scenario: The scene.
+            control: What the synthesis is told: friction factor, preload, objective.
+            with_joints: Whether the arms are part of the problem: (15) and (16).
+
+        Raises:
+            PathError: The arms cannot follow the path.
+        """
+        self.scenario = scenario
+        self._path = ScrewPath(scenario.path)
+        self.end_deg = float(np.degrees(self._path.end))
+        self._robot = RobotModel(scenario) if with_joints else None
+        self._joint_path = plan_joints(scenario) if with_joints else None
+        self._statics = Statics(scenario, control, self._robot)
+
+    def tilts(self, step_deg: float) -> Array:
+        """Evenly spaced tilts from start to end, at most a step apart [deg]."""
+        return np.linspace(0.0, self.end_deg, int(np.ceil(self.end_deg / step_deg - 1e-9)) + 1)
+
+    def problem(self, tilt_deg: float) -> Problem:
+        """The problem at a tilt [deg].
+
+        Raises:
+            InvalidInputError: The tilt is not on the path.
+        """
+        tilt = self._tilt(tilt_deg)
+        if self._robot is not None and self._joint_path is not None:
+            self._robot.update(self._joint_path.holding(tilt))
+        R_WO, p_WO = self._path.pose(tilt)
+        return self._statics.problem(p_WO, Rotation.from_matrix(R_WO).as_quat(scalar_first=True))
+
+    def gravity(self, tilt_deg: float) -> Gravity:
+        """The object's weight at a tilt [deg]."""
+        thing = self.scenario.object
+        return Gravity(
+            weight=thing.mass * GRAVITY,
+            direction_O=self.orientation(tilt_deg).T @ np.array([0.0, 0.0, -1.0]),
+            center_O=np.asarray(thing.center_of_mass),
+        )
+
+    def orientation(self, tilt_deg: float) -> Array:
+        """Orientation of the object at a tilt [deg], R_WO, (3, 3)."""
+        return self._path.pose(self._tilt(tilt_deg))[0]
+
+    def _tilt(self, tilt_deg: float) -> float:
+        if not 0.0 <= tilt_deg <= self.end_deg + 1e-9:
+            raise InvalidInputError("tilt", tilt_deg, f"from 0 to {self.end_deg:g} deg")
+        return min(float(np.radians(tilt_deg)), self._path.end)
