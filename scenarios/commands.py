@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import math
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -11,6 +12,7 @@ import tyro
 
 from scenarios.common import (
     FAILED,
+    INTERRUPTED,
     PASSED,
     check_json,
     chosen_control,
@@ -112,10 +114,12 @@ class Capacity:
         trials = []
         # The scenario's own manoeuvre comes first.
         own = found[0]
-        if self.confirm and 0.0 < own.weight < float("inf"):
+        if self.confirm and 0.0 < own.weight < math.inf:
             for share in _CONFIRMED_SHARES:
                 with progress_bar(f"{100 * share:.0f} % of {own.weight:.4g} N") as progress:
                     trial = confirm(chosen, self.controller, control, own.weight, share, progress)
+                if trial.verdict is Verdict.INTERRUPTED:
+                    return INTERRUPTED
                 trials.append(trial)
                 _print_trial(console, trial)
         if self.json is not None:
@@ -208,7 +212,7 @@ def _print_optimum(console: Console, optimum: Optimum) -> None:
 
 
 def _print_capacity(console: Console, capacity: capacities.Capacity) -> None:
-    if capacity.weight == float("inf"):
+    if capacity.weight == math.inf:
         console.print(f"{capacity.manoeuvre}: any weight; nothing limits the grip")
         return
     curve = dict(zip(capacity.tilts_deg, capacity.weights, strict=True))
@@ -224,10 +228,13 @@ def _print_capacity(console: Console, capacity: capacities.Capacity) -> None:
     if capacity.conflict is not None:
         console.print(f"  there {', '.join(capacity.conflict.limits)}", end=" ", soft_wrap=True)
         console.print(f"against {', '.join(capacity.conflict.balances)}", soft_wrap=True)
-    digits = f"{capacity.confirmed_within:.0e}"
-    console.print(
-        f"  feasible just below and infeasible just above (to {digits}) when solved again"
-    )
+    if capacity.weight > 0.0 and math.isfinite(capacity.confirmed_within):
+        console.print(
+            "  feasible just below and infeasible just above, when solved again "
+            f"{capacity.confirmed_within:.0e} to either side"
+        )
+    elif capacity.weight > 0.0:
+        console.print("  not confirmed by solving again to either side")
 
 
 def _print_trial(console: Console, trial: capacities.Trial) -> None:
