@@ -3,13 +3,13 @@
 from dataclasses import replace
 
 from scenarios.box_tilt import SCENARIO as BOX_TILT
+from sim.scenario import lifted
 from sim.settings import HOLD, REACH, TILT
 
 SCENARIO = replace(
-    BOX_TILT,
+    lifted(BOX_TILT),
     name="box-lift",
     summary="Baxter lifts the box off and turns it in the air (paper: infeasible)",
-    supports=(),
     path=replace(BOX_TILT.path, travel=(0.0, 0.0, 0.1)),
     phases=(*REACH, *TILT, *HOLD),
 )

@@ -10,7 +10,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from datetime import datetime
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Protocol
 
 import tyro
 
@@ -21,8 +21,10 @@ from scenarios.common import (
     INTERRUPTED,
     PASSED,
     chosen_control,
+    new_folder,
     progress_bar,
 )
+from scenarios.paper.command import Reproduce
 from synthesis.errors import FulcrumError, InvalidInputError
 
 if TYPE_CHECKING:
@@ -125,10 +127,7 @@ class Run:
     def _out(self) -> Path:
         stamp = datetime.now().strftime("%Y%m%d-%H%M%S")
         out = self.out or Path("logs") / f"{self.scenario}-{self.controller}-{stamp}"
-        nearest = next(path for path in (out, *out.absolute().parents) if path.exists())
-        if not nearest.is_dir() or (out.exists() and any(out.iterdir())):
-            raise InvalidInputError("--out", str(out), "a new or empty folder")
-        return out
+        return new_folder(out)
 
 
 @dataclass(frozen=True)
@@ -178,7 +177,12 @@ Command = (
     | Annotated[View, tyro.conf.subcommand("view")]
     | Annotated[Explain, tyro.conf.subcommand("explain")]
     | Annotated[Capacity, tyro.conf.subcommand("capacity")]
+    | Annotated[Reproduce, tyro.conf.subcommand("reproduce")]
 )
+
+
+class _Executable(Protocol):
+    def execute(self) -> int: ...
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -196,12 +200,17 @@ def main(arguments: Sequence[str] | None = None) -> int:
         return INTERRUPTED
 
 
-def _parse(arguments: Sequence[str] | None) -> List | Run | Screenshot | View | Explain | Capacity:
+def _parse(
+    arguments: Sequence[str] | None,
+) -> List | Run | Screenshot | View | Explain | Capacity | Reproduce:
     """The command asked for; a parse error leaves as one line instead of tyro's box."""
     errors = io.StringIO()
     try:
         with contextlib.redirect_stderr(errors):
-            return tyro.cli(Command, prog="fulcrum", description=_DESCRIPTION, args=arguments)
+            return cast(
+                _Executable,
+                tyro.cli(Command, prog="fulcrum", description=_DESCRIPTION, args=arguments),
+            )
     except SystemExit as stop:
         if stop.code == 0:
             raise

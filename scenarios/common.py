@@ -56,3 +56,15 @@ def check_json(path: Path | None) -> None:
     """Raises InvalidInputError before the work is done if a JSON file could not be written."""
     if path is not None and (path.is_dir() or not path.parent.is_dir()):
         raise InvalidInputError("--json", str(path), "a file in a folder that exists")
+
+
+def new_folder(out: Path) -> Path:
+    """The folder, if results may be written there.
+
+    Raises:
+        InvalidInputError: It is not empty, or cannot be a folder.
+    """
+    nearest = next(path for path in (out, *out.absolute().parents) if path.exists())
+    if not nearest.is_dir() or (out.exists() and any(out.iterdir())):
+        raise InvalidInputError("--out", str(out), "a new or empty folder")
+    return out

@@ -3,11 +3,11 @@
 from dataclasses import replace
 
 from scenarios.cylinder_tilt import SCENARIO as CYLINDER_TILT
+from sim.scenario import lifted
 
 SCENARIO = replace(
-    CYLINDER_TILT,
+    lifted(CYLINDER_TILT),
     name="cylinder-lift",
     summary="The gripper lifts the cylinder off and turns it in the air (paper: infeasible)",
-    supports=(),
     path=replace(CYLINDER_TILT.path, travel=(0.0, 0.0, 0.1)),
 )

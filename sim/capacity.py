@@ -18,7 +18,7 @@ from sim.conflict import Conflict, conflict
 from sim.poses import PathProblems
 from sim.report import Verdict
 from sim.run import Progress, Request, execute
-from sim.scenario import GRAVITY, Scenario
+from sim.scenario import GRAVITY, Scenario, lifted
 from sim.settings import Control
 from synthesis import InfeasibleError, Synthesizer
 from synthesis.relaxation import Kind, change, weight_range
@@ -99,7 +99,7 @@ def capacities(
     Raises:
         PathError: The arms cannot follow the path.
     """
-    scenes = [("lift", replace(scenario, supports=()))]
+    scenes = [("lift", lifted(scenario))]
     if scenario.supports:
         scenes.insert(0, ("pivot", scenario))
     found = []

@@ -21,7 +21,14 @@ from sim.robot import RobotModel
 from sim.scenario import Scenario
 from sim.settings import Control
 from sim.statics import Statics
-from synthesis import InfeasibleError, Solution, SolverError, Synthesizer, UnboundedError
+from synthesis import (
+    InfeasibleError,
+    Problem,
+    Solution,
+    SolverError,
+    Synthesizer,
+    UnboundedError,
+)
 from synthesis.best_effort import BestEffort, best_effort
 from synthesis.contact import Array
 
@@ -110,15 +117,20 @@ class Controller:
     def _synthesize(self, measurement: Measurement) -> bool:
         """Takes over the forces of a solution, if there is one; returns whether there was."""
         problem = self._statics.problem(measurement.p_WO, measurement.quat_WO)
-        forces: Solution | BestEffort
-        try:
-            forces, solved = self._synthesizer.solve(problem), True
-        except InfeasibleError:
-            if not self._control.best_effort:
-                return False
-            forces, solved = best_effort(problem), False
-        except (UnboundedError, SolverError):
+        forces = self._solve(problem)
+        if forces is None:
             return False
         self._w_OC_C = forces.w_OC_C
         self._tau_f = forces.tau - self._tau_g
-        return solved
+        return isinstance(forces, Solution)
+
+    def _solve(self, problem: Problem) -> Solution | BestEffort | None:
+        try:
+            return self._synthesizer.solve(problem)
+        except (InfeasibleError, UnboundedError, SolverError):
+            if not self._control.best_effort:
+                return None
+        try:
+            return best_effort(problem)
+        except (InfeasibleError, SolverError):
+            return None

@@ -362,7 +362,7 @@ def _synthesis_failures(trace: Trace) -> list[_Failure]:
     if not failed.any():
         return []
     count = int(failed.sum())
-    text = f"The synthesis found no forces {count} times, first at {{when}}; the last were kept."
+    text = f"The synthesis found no forces {count} times, first at {{when}}."
     return [_failure(trace, failed, text)]
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from sim.settings import HOLD, REACH, STANDOFF, TILT, Control, Phase, Physics, Tolerances
 from synthesis import InvalidInputError
@@ -130,6 +130,21 @@ class Support:
 
 
 @dataclass(frozen=True)
+class Rest:
+    """Where the object may lie on the environment without the synthesis counting on it.
+
+    Attributes:
+        geom: The object's geom that touches.
+        surface: Name of the environment's geom that is touched.
+        friction: Between object and surface.
+    """
+
+    geom: str
+    surface: str
+    friction: Friction
+
+
+@dataclass(frozen=True)
 class Robot:
     """The robot, its place and its start posture.
 
@@ -189,7 +204,12 @@ class View:
 
 @dataclass(frozen=True)
 class Scenario:
-    """Everything that a run needs to know; nothing else may distinguish one scene from another."""
+    """Everything that a run needs to know; nothing else may distinguish one scene from another.
+
+    ``holdable`` says whether forces that hold the object are expected to exist all along the path;
+    a scenario that shows the contrary says False. ``rests`` is where the object may lie besides
+    its supports, ``standoff`` the distance of the hands from their contacts at the start [m].
+    """
 
     name: str
     summary: str
@@ -199,8 +219,10 @@ class Scenario:
     supports: tuple[Support, ...]
     robot: Robot
     path: Pivot
+    rests: tuple[Rest, ...] = ()
     phases: tuple[Phase, ...] = (*REACH, *TILT, *HOLD)
     standoff: float = STANDOFF
+    holdable: bool = True
     control: Control = Control()
     physics: Physics = Physics()
     tolerances: Tolerances = Tolerances()
@@ -208,18 +230,28 @@ class Scenario:
 
     def __post_init__(self) -> None:
         geoms = [g.name for g in self.object.geoms]
-        touched = [(c.name, c.geom) for c in self.hands] + [(c.name, c.geom) for c in self.supports]
+        touched = [(hand.name, hand.geom) for hand in self.hands]
+        touched += [(support.name, support.geom) for support in self.supports]
+        touched += [("rest", rest.geom) for rest in self.rests]
         for name, geom in touched:
             if geom not in geoms:
                 raise InvalidInputError(f"{name}.geom", geom, f"one of {', '.join(geoms)}")
         surfaces = [g.name for g in self.environment]
-        for support in self.supports:
-            if support.surface not in surfaces:
-                raise InvalidInputError(
-                    f"{support.name}.surface", support.surface, f"one of {', '.join(surfaces)}"
-                )
+        placed = [(support.name, support.surface) for support in self.supports]
+        placed += [("rest", rest.surface) for rest in self.rests]
+        for name, surface in placed:
+            if surface not in surfaces:
+                raise InvalidInputError(f"{name}.surface", surface, f"one of {', '.join(surfaces)}")
 
     @property
     def contact_names(self) -> tuple[str, ...]:
         """Names of all contacts, hands first: the order of every per-contact array."""
         return (*(hand.name for hand in self.hands), *(support.name for support in self.supports))
+
+
+def lifted(scenario: Scenario) -> Scenario:
+    """The scenario without its environment contacts: the object lies there, but is to come off."""
+    rests = {Rest(s.geom, s.surface, s.friction) for s in scenario.supports}
+    rests |= set(scenario.rests)
+    ordered = tuple(sorted(rests, key=lambda rest: (rest.surface, rest.geom)))
+    return replace(scenario, supports=(), rests=ordered, holdable=False)

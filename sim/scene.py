@@ -156,14 +156,13 @@ def _add_pairs(spec: mujoco.MjSpec, scenario: Scenario) -> None:
     for hand in scenario.hands:
         _add_pair(spec, scenario, tip_geom(hand), hand.geom, hand.friction)
     frictions: dict[tuple[str, str], Friction] = {}
-    for support in scenario.supports:
-        key = (support.surface, support.geom)
-        if frictions.setdefault(key, support.friction) != support.friction:
-            raise InvalidInputError(
-                f"{support.name}.friction",
-                support.friction,
-                f"{frictions[key]}, as at other contacts of {support.geom} on {support.surface}",
-            )
+    placed = [(s.name, s.surface, s.geom, s.friction) for s in scenario.supports]
+    placed += [("rest", r.surface, r.geom, r.friction) for r in scenario.rests]
+    for name, surface, geom, friction in placed:
+        known = frictions.setdefault((surface, geom), friction)
+        if known != friction:
+            valid = f"{known}, as at other contacts of {geom} on {surface}"
+            raise InvalidInputError(f"{name}.friction", friction, valid)
     for (surface, geom), friction in frictions.items():
         _add_pair(spec, scenario, surface, geom, friction)
 
