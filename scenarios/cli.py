@@ -207,10 +207,7 @@ def _parse(
     errors = io.StringIO()
     try:
         with contextlib.redirect_stderr(errors):
-            return cast(
-                _Executable,
-                tyro.cli(Command, prog="fulcrum", description=_DESCRIPTION, args=arguments),
-            )
+            return tyro.cli(Command, prog="fulcrum", description=_DESCRIPTION, args=arguments)
     except SystemExit as stop:
         if stop.code == 0:
             raise
