@@ -226,12 +226,13 @@ class _Follower:
         reasons = []
         for j in range(model.njnt):
             name, (low, high) = model.joint(j).name, model.jnt_range[j]
+            unit = "m" if model.jnt_type[j] == mujoco.mjtJoint.mjJNT_SLIDE else "rad"
             if too_fast[j]:
-                reasons.append(f"{name} at its speed limit {self._qd_max[j]:g} rad/s")
+                reasons.append(f"{name} at its speed limit {self._qd_max[j]:g} {unit}/s")
             if q[j] - low < _AT_LIMIT:
-                reasons.append(f"{name} at its lower limit {low:.3f} rad")
+                reasons.append(f"{name} at its lower limit {low:.3f} {unit}")
             if high - q[j] < _AT_LIMIT:
-                reasons.append(f"{name} at its upper limit {high:.3f} rad")
+                reasons.append(f"{name} at its upper limit {high:.3f} {unit}")
         near = sorted(
             (distance, first, second)
             for first, second in self._collisions.geom_id_pairs
