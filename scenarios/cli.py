@@ -239,7 +239,7 @@ def _print_report(report: Report, out: Path) -> None:
     for name, c in report.contacts.items():
         table.add_row(
             name,
-            f"{100 * c.kept_fraction:.1f}",
+            f"{c.kept_percent:.1f}",
             f"{c.slip_mm:.3f}",
             f"{c.slide_mm:.3f}",
             f"{c.spin_deg:.3f}",
@@ -249,7 +249,7 @@ def _print_report(report: Report, out: Path) -> None:
     console.print(table)
     tilt, torque, timing = report.tilt, report.torque, report.timing
     console.print(
-        f"tilt {tilt.final_deg:.2f} of {tilt.target_deg:g} deg, error at most "
+        f"tilt {tilt.final_deg:z.2f} of {tilt.target_deg:g} deg, error at most "
         f"{tilt.max_error_deg:.3f} deg; torque at most {100 * torque.max_utilisation:.0f} % of its "
         f"limit ({torque.joint}); {timing.real_time_factor:.1f} x real time",
         highlight=False,

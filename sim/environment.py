@@ -9,6 +9,7 @@ import numpy as np
 from dm_control.rl import control
 from dm_env import specs
 
+from sim.checks import positive
 from sim.ik import plan_joints
 from sim.path import ScrewPath
 from sim.plant import Plant
@@ -92,14 +93,17 @@ def make_environment(
         control_timestep: Time between actions [s]; that of the synthesis if left out.
 
     Raises:
-        PathError: The arms cannot reach the start.
+        InvalidInputError: The time between actions is not a finite number > 0.
+        PathError: The arms cannot follow the path.
     """
+    if control_timestep is None:
+        control_timestep = scenario.control.solve_every * scenario.physics.timestep
+    positive("control_timestep", control_timestep)
     plant = Plant(scenario)
     return control.Environment(
         plant.physics,
         TiltTask(scenario, plant, seed),
         time_limit=Schedule(scenario).total_s,
-        control_timestep=control_timestep
-        or scenario.control.solve_every * scenario.physics.timestep,
+        control_timestep=control_timestep,
         legacy_step=False,  # else new contacts would be read with old forces
     )

@@ -15,7 +15,7 @@ import pinocchio as pin
 from assets import velocity_limits
 from sim.scenario import Scenario
 from sim.scene import compose, tip_site
-from synthesis import Joints
+from synthesis import InvalidInputError, Joints
 from synthesis.contact import Array
 
 
@@ -111,6 +111,9 @@ def pinocchio_model(scene: mujoco.MjModel) -> pin.Model:
     """Pinocchio model of all bodies of a compiled scene that hang on hinges and slides.
 
     Bodies with a free joint (the object) are left out. Sites become frames of their names.
+
+    Raises:
+        InvalidInputError: A joint is neither a hinge nor a slide.
     """
     model = pin.Model()
     model.gravity.linear = scene.opt.gravity
@@ -130,6 +133,8 @@ def pinocchio_model(scene: mujoco.MjModel) -> pin.Model:
             hinge = scene.jnt_type[j] == mujoco.mjtJoint.mjJNT_HINGE
             kind = pin.JointModelRevoluteUnaligned if hinge else pin.JointModelPrismaticUnaligned
             name = scene.joint(j).name
+            if scene.jnt_type[j] == mujoco.mjtJoint.mjJNT_BALL:
+                raise InvalidInputError(f"joint {name}", "a ball joint", "a hinge or a slide")
             joint = model.addJoint(joint, kind(scene.jnt_axis[j]), placement * anchor, name)
             model.armature[model.joints[joint].idx_v] = scene.dof_armature[scene.jnt_dofadr[j]]
             placement = anchor.inverse()

@@ -13,11 +13,12 @@ from typing import Any
 
 from sim.explain import Explanation, explain
 from sim.files import finite, write_json
+from sim.judge import Judge
 from sim.loop import ClosedLoop, DivergedError
 from sim.monitor import ContactHistory, Monitor
 from sim.poses import PathProblems
 from sim.recording import Recorder, open_viewer
-from sim.report import Judge, Report, RunInfo
+from sim.report import Report, RunInfo
 from sim.scenario import Scenario
 from sim.settings import Control
 from sim.trace import Trace
@@ -192,7 +193,7 @@ def markdown(report: Report) -> str:
     lines += [
         "",
         f"Controller {report.controller}, objective {report.objective}, seed {report.seed}.",
-        f"Tilt {tilt.final_deg:.2f} of {tilt.target_deg:g} deg, error at most "
+        f"Tilt {tilt.final_deg:z.2f} of {tilt.target_deg:g} deg, error at most "
         f"{tilt.max_error_deg:.3f} deg; torque at most {100 * torque.max_utilisation:.0f} % of "
         f"its limit ({torque.joint}).",
         "",
@@ -200,7 +201,7 @@ def markdown(report: Report) -> str:
         "|---|---|---|---|---|---|---|",
     ]
     lines += [
-        f"| {name} | {100 * c.kept_fraction:.1f} % | {c.slip_mm:.3f} | {c.slide_mm:.3f} | "
+        f"| {name} | {c.kept_percent:.1f} % | {c.slip_mm:.3f} | {c.slide_mm:.3f} | "
         f"{c.spin_deg:.3f} | {c.max_utilisation:.2f} | {c.force_error_rms_n:.2f} |"
         for name, c in report.contacts.items()
     ]

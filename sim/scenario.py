@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, replace
 
+from sim.checks import axes, not_negative, positive
 from sim.settings import HOLD, REACH, STANDOFF, TILT, Control, Phase, Physics, Tolerances
 from synthesis import InvalidInputError
 
@@ -61,6 +62,11 @@ class Object:
     geoms: tuple[Geom, ...]
     center_of_mass: Vector = (0.0, 0.0, 0.0)
 
+    def __post_init__(self) -> None:
+        positive(f"{self.name}.mass", self.mass)
+        for moment in self.inertia:
+            positive(f"{self.name}.inertia", moment)
+
 
 @dataclass(frozen=True)
 class Friction:
@@ -73,6 +79,11 @@ class Friction:
 
     mu: float
     e_n: float | None = None
+
+    def __post_init__(self) -> None:
+        positive("friction.mu", self.mu)
+        if self.e_n is not None:
+            positive("friction.e_n", self.e_n)
 
 
 @dataclass(frozen=True)
@@ -105,6 +116,11 @@ class Hand:
     friction: Friction
     f_n_max: float = math.inf
 
+    def __post_init__(self) -> None:
+        axes(self.name, ("normal_O", self.normal_O), ("tangent_O", self.tangent_O))
+        if not self.f_n_max > 0.0:
+            raise InvalidInputError(f"{self.name}.f_n_max", self.f_n_max, "a number > 0")
+
 
 @dataclass(frozen=True)
 class Support:
@@ -116,7 +132,7 @@ class Support:
         surface: Name of the environment's geom that is touched.
         p_OP_O: The point in the object frame [m].
         normal_W: Surface normal in world axes, into the object.
-        tangent_W: First tangent in world axes.
+        tangent_W: First tangent in world axes, perpendicular to the normal.
         friction: Between object and surface.
     """
 
@@ -127,6 +143,9 @@ class Support:
     normal_W: Vector
     tangent_W: Vector
     friction: Friction
+
+    def __post_init__(self) -> None:
+        axes(self.name, ("normal_W", self.normal_W), ("tangent_W", self.tangent_W))
 
 
 @dataclass(frozen=True)
@@ -166,6 +185,12 @@ class Robot:
     still: tuple[str, ...] = ()
     base: Pose = Pose()
     start_deviation: float = 1e-4
+
+    def __post_init__(self) -> None:
+        for joint, angle in self.posture.items():
+            if not math.isfinite(angle):
+                raise InvalidInputError(f"robot.posture.{joint}", angle, "a finite number")
+        not_negative("robot.start_deviation", self.start_deviation)
 
 
 @dataclass(frozen=True)
@@ -229,6 +254,12 @@ class Scenario:
     view: View = View()
 
     def __post_init__(self) -> None:
+        not_negative("standoff", self.standoff)
+        if not self.phases:
+            raise InvalidInputError("phases", self.phases, "at least one phase")
+        for name in self.contact_names:
+            if self.contact_names.count(name) > 1:
+                raise InvalidInputError("contact names", name, "a name that no other contact has")
         geoms = [g.name for g in self.object.geoms]
         touched = [(hand.name, hand.geom) for hand in self.hands]
         touched += [(support.name, support.geom) for support in self.supports]

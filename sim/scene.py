@@ -31,7 +31,8 @@ def compose(scenario: Scenario, motion: ObjectMotion = ObjectMotion.FREE) -> muj
     """The scene as an editable specification.
 
     Raises:
-        InvalidInputError: The scenario names a joint, mount or geom type that does not exist.
+        InvalidInputError: The scenario names a joint, mount, part of a hand or geom type that does
+            not exist, or a start angle outside its joint's range.
     """
     spec = _robot_with_hands(scenario)
     spec.modelname = scenario.name
@@ -90,16 +91,13 @@ def _set_options(spec: mujoco.MjSpec, scenario: Scenario) -> None:
 
 def _robot_with_hands(scenario: Scenario) -> mujoco.MjSpec:
     robot = mujoco.MjSpec.from_file(str(asset_path(scenario.robot.model)))
-    known = [joint.name for joint in robot.joints]
-    for name in scenario.robot.posture:
-        if name not in known:
-            raise InvalidInputError("robot.posture", name, f"one of {', '.join(known)}")
+    _check_posture(robot, scenario)
     for hand in scenario.hands:
         mount = robot.body(hand.mount)
         if mount is None:
             bodies = ", ".join(body.name for body in robot.bodies)
             raise InvalidInputError(f"{hand.name}.mount", hand.mount, f"one of {bodies}")
-        model = mujoco.MjSpec.from_file(str(asset_path(hand.model)))
+        model = _hand_model(hand)
         mount.add_frame().attach_body(model.body("pad"), f"{hand.name}_", "")
     for actuator in list(robot.actuators):
         if actuator.target not in scenario.robot.posture:
@@ -115,6 +113,26 @@ def _robot_with_hands(scenario: Scenario) -> mujoco.MjSpec:
         )
         root.pos, root.quat = position, quaternion
     return robot
+
+
+def _check_posture(robot: mujoco.MjSpec, scenario: Scenario) -> None:
+    """Refuses start angles of joints that do not exist, or outside a joint's range."""
+    model = robot.copy().compile()
+    known = [model.joint(j).name for j in range(model.njnt)]
+    for name, angle in scenario.robot.posture.items():
+        if name not in known:
+            raise InvalidInputError("robot.posture", name, f"one of {', '.join(known)}")
+        low, high = model.joint(name).range
+        if model.joint(name).limited[0] and not low <= angle <= high:
+            raise InvalidInputError(f"robot.posture.{name}", angle, f"in [{low:g}, {high:g}]")
+
+
+def _hand_model(hand: Hand) -> mujoco.MjSpec:
+    model = mujoco.MjSpec.from_file(str(asset_path(hand.model)))
+    for kind, part in (("body", "pad"), ("geom", "tip"), ("site", "tip_center")):
+        if getattr(model, kind)(part) is None:
+            raise InvalidInputError(f"{hand.name}.model", hand.model, f"one with a {kind} {part}")
+    return model
 
 
 def _add_geom(body: mujoco.MjsBody, geom: Geom) -> None:

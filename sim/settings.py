@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, replace
 
+from sim.checks import not_negative, positive, whole
 from synthesis import InvalidInputError, Objective
 
 # A trace takes about 2 kB per step: a gigabyte in this time [s].
@@ -98,11 +99,8 @@ class Control:
         if not 0.0 < self.friction_factor <= 1.0:
             raise InvalidInputError("control.friction_factor", self.friction_factor, "in (0, 1]")
         for name in ("preload", "bandwidth"):
-            value = getattr(self, name)
-            if not (math.isfinite(value) and value >= 0.0):
-                raise InvalidInputError(f"control.{name}", value, "a finite number >= 0")
-        if self.solve_every < 1:
-            raise InvalidInputError("control.solve_every", self.solve_every, "at least 1 step")
+            not_negative(f"control.{name}", getattr(self, name))
+        whole("control.solve_every", self.solve_every, least=1)
 
 
 def controllers(control: Control) -> dict[str, Control]:
@@ -137,6 +135,18 @@ class Physics:
     solref: tuple[float, float] = (0.01, 1.0)
     solimp: tuple[float, float, float] = (0.99, 0.99, 0.001)
     solref_friction: tuple[float, float] = (0.002, 1.0)
+
+    def __post_init__(self) -> None:
+        positive("physics.timestep", self.timestep)
+        positive("physics.impratio", self.impratio)
+        whole("physics.noslip_iterations", self.noslip_iterations, least=0)
+        for name in ("solref", "solref_friction"):
+            for value in getattr(self, name):
+                positive(f"physics.{name}", value)
+        d0, dmax, width = self.solimp
+        if not 0.0 < d0 <= dmax < 1.0:
+            raise InvalidInputError("physics.solimp", self.solimp, "0 < d0 <= dmax < 1")
+        positive("physics.solimp", width)
 
 
 @dataclass(frozen=True)

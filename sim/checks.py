@@ -1,0 +1,42 @@
+"""Checks that scenario and settings share; every refusal names the field and what is valid."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+from synthesis import InvalidInputError
+
+# Directions are typed in with a few digits, or computed; a cone is off by as little.
+_DIRECTION = 1e-6
+
+
+def positive(field: str, value: float) -> None:
+    """Refuses what is not a finite number > 0."""
+    if not (math.isfinite(value) and value > 0.0):
+        raise InvalidInputError(field, value, "a finite number > 0")
+
+
+def not_negative(field: str, value: float) -> None:
+    """Refuses what is not a finite number >= 0."""
+    if not (math.isfinite(value) and value >= 0.0):
+        raise InvalidInputError(field, value, "a finite number >= 0")
+
+
+def whole(field: str, value: object, least: int) -> None:
+    """Refuses what is not an integer of at least ``least``."""
+    if not isinstance(value, int) or isinstance(value, bool) or value < least:
+        raise InvalidInputError(field, value, f"an integer >= {least}")
+
+
+def axes(
+    field: str, normal: tuple[str, Sequence[float]], tangent: tuple[str, Sequence[float]]
+) -> None:
+    """Refuses a normal and a tangent, each with its name, that are not unit and perpendicular."""
+    for name, vector in (normal, tangent):
+        if not abs(math.hypot(*vector) - 1.0) < _DIRECTION:
+            raise InvalidInputError(f"{field}.{name}", vector, "a vector of length 1")
+    if not abs(sum(n * t for n, t in zip(normal[1], tangent[1], strict=True))) < _DIRECTION:
+        raise InvalidInputError(
+            f"{field}.{tangent[0]}", tangent[1], f"perpendicular to {normal[0]} {normal[1]}"
+        )
