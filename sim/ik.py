@@ -26,13 +26,13 @@ _ITERATIONS = 50
 _SOLVED = 1e-9
 # Gauss-Newton damping: small against the squared singular values of the task (> 0.01).
 _DAMPING = 1e-8
-# The same for joints that are to keep still: large against it, so that the others move instead.
-_STILL_DAMPING = 1e-2
 # Clearance that links keep from each other and from the scene, and from where they look out [m].
 _CLEARANCE, _DETECTION = 0.005, 0.05
 # How near to a limit counts as being at it [rad, m, or share of the speed limit].
 _AT_LIMIT = 1e-3
 _NAMED_COLLISIONS = 3
+# Damping of joints that are to keep still: large against the others', so that those move instead.
+_STILL_DAMPING = 1e-2
 
 
 class PathError(FulcrumError):
