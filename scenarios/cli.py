@@ -111,7 +111,8 @@ class Run:
     def _out(self) -> Path:
         stamp = datetime.now().strftime("%Y%m%d-%H%M%S")
         out = self.out or Path("logs") / f"{self.scenario}-{self.controller}-{stamp}"
-        if out.exists() and (not out.is_dir() or any(out.iterdir())):
+        nearest = next(path for path in (out, *out.absolute().parents) if path.exists())
+        if not nearest.is_dir() or (out.exists() and any(out.iterdir())):
             raise InvalidInputError("--out", str(out), "a new or empty folder")
         return out
 
@@ -165,12 +166,18 @@ Command = (
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Runs a command; returns the exit code: 0 pass, 1 failed its checks, 2 bad input."""
+    """Runs a command; returns the exit code.
+
+    0 pass, 1 failed its checks, 2 bad input, 130 interrupted.
+    """
     try:
         return _parse(arguments).execute()
     except (FulcrumError, OSError) as error:
-        print(f"fulcrum: {error}", file=sys.stderr)
+        print(f"fulcrum: {' '.join(str(error).split())}", file=sys.stderr)
         return BAD_INPUT
+    except KeyboardInterrupt:  # a run that has begun catches it itself
+        print("fulcrum: interrupted.", file=sys.stderr)
+        return INTERRUPTED
 
 
 def _parse(arguments: Sequence[str] | None) -> List | Run | Screenshot | View:
@@ -199,9 +206,11 @@ def _progress(name: str):  # type: ignore[no-untyped-def]
     from rich.console import Console
     from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
 
-    columns = (TextColumn(name), BarColumn(), TextColumn("{task.percentage:3.0f} %"))
+    share, left = TextColumn("{task.percentage:3.0f} %"), TimeRemainingColumn()
+    columns = (TextColumn(name), BarColumn(), share, left)
     console = Console(stderr=True)
-    with Progress(*columns, TimeRemainingColumn(), console=console, transient=True) as bar:
+    quiet = not console.is_terminal
+    with Progress(*columns, console=console, transient=True, disable=quiet) as bar:
         task = bar.add_task(name, total=None)
         yield lambda done, total: bar.update(task, completed=done, total=total)
 

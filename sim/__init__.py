@@ -1,0 +1,1 @@
+"""The plant and the loop: scene, inverse kinematics, controller, monitor, verdict, recording."""

@@ -26,8 +26,8 @@ class TiltTask(control.Task):
     - ``object_pose``: position [m] and quaternion wxyz, (7,); ``object_twist``: (6,), linear first.
     - ``contact_forces``: force on the object in world axes [N] and torsional moment [N·m], (m, 4).
 
-    Contact forces are those during the last physics step. The reward is the share of the path's
-    tilt that is reached, from 0 to 1.
+    Contact forces and the object's twist are those during the last physics step, joints and pose
+    those after it. The reward is the share of the path's tilt that is reached, from 0 to 1.
     """
 
     def __init__(self, scenario: Scenario, plant: Plant, seed: int) -> None:

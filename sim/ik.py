@@ -26,6 +26,9 @@ _ITERATIONS = 50
 _SOLVED = 1e-9
 # Gauss-Newton damping: small against the squared singular values of the task (> 0.01).
 _DAMPING = 1e-8
+# Longest step of a joint while the start is sought [rad or m]: longer ones leave the region where
+# the task is linear, and an arm that is out of reach ends far from it, at limits of no concern.
+_START_STEP = 0.05
 # Clearance that links keep from each other and from the scene, and from where they look out [m].
 _CLEARANCE, _DETECTION = 0.005, 0.05
 # How near to a limit counts as being at it [rad, m, or share of the speed limit].
@@ -132,14 +135,16 @@ class _Follower:
         self._pose_object(tilt)
         for task, target in zip(self._tasks, self._tip_poses(tilt), strict=True):
             task.set_target(target)
-        limits: list[mink.Limit] = [mink.ConfigurationLimit(self._model), self._collisions]
-        dt = 1.0
+        # Without a duration one iteration counts as a second, and its speed limit as a step.
+        dt, speeds = 1.0, np.full_like(self._qd_max, _START_STEP)
         if duration is not None:
-            dt = duration
-            names = [self._model.joint(j).name for j in range(self._model.njnt)]
-            limits.append(
-                mink.VelocityLimit(self._model, dict(zip(names, self._qd_max, strict=True)))
-            )
+            dt, speeds = duration, self._qd_max
+        names = [self._model.joint(j).name for j in range(self._model.njnt)]
+        limits: list[mink.Limit] = [
+            mink.ConfigurationLimit(self._model),
+            mink.VelocityLimit(self._model, dict(zip(names, speeds, strict=True))),
+            self._collisions,
+        ]
         start = self._configuration.q.copy()
         for _ in range(_ITERATIONS):
             if self._error() < _SOLVED:
@@ -156,7 +161,7 @@ class _Follower:
         too_fast = np.zeros(len(moved), bool)
         if duration is not None:
             too_fast = moved >= (1.0 - _AT_LIMIT) * duration * self._qd_max
-        if self._error() >= _SOLVED or too_fast.any():
+        if not self._error() < _SOLVED or too_fast.any():  # a NaN is no solution
             reached = tilt if previous is None else previous
             raise PathError(float(np.degrees(reached)), self._error(), self._reasons(too_fast))
 

@@ -26,6 +26,16 @@ class ScrewPath:
         length = float(np.linalg.norm(pivot.axis_W))
         if not (np.isfinite(length) and length > 0.0):
             raise InvalidInputError("path.axis_W", pivot.axis_W, "a finite vector that is not zero")
+        for name, value in (
+            ("point_W", pivot.point_W),
+            ("pitch", pivot.pitch),
+            ("start.position", pivot.start.position),
+            ("start.quaternion", pivot.start.quaternion),
+        ):
+            if not np.isfinite(value).all():
+                raise InvalidInputError(f"path.{name}", value, "finite numbers")
+        if not 0.0 < pivot.angle_deg < 180.0:
+            raise InvalidInputError("path.angle_deg", pivot.angle_deg, "in (0, 180) deg")
         self.axis = np.asarray(pivot.axis_W, float) / length
         self.end = float(np.radians(pivot.angle_deg))
         self._point = np.asarray(pivot.point_W, float)
@@ -43,7 +53,7 @@ class ScrewPath:
         """Tilt [rad] of measured orientations, (..., 4) wxyz: their twist about the axis.
 
         The twist is the part of the rotation from the start that is about the axis, in
-        (-pi, pi]; what is left, the swing, does not count as tilt.
+        [-pi, pi); what is left, the swing, does not count as tilt.
         """
         flat = np.reshape(quaternion, (-1, 4))
         turn = (Rotation.from_quat(flat, scalar_first=True) * self._R_WO.inv()).as_quat(

@@ -201,7 +201,8 @@ class Judge:
             allowed = f"more than the allowed {limits.slip_mm:g} mm"
             if slip.any():
                 text = (
-                    f"Contact {name} slipped {allowed} at {{when}}; {contact.slip_mm:.3g} in all."
+                    f"Contact {name} slipped {allowed} at {{when}}; "
+                    f"{contact.slip_mm:.3g} mm in all."
                 )
                 failures.append(_failure(trace, slip, text))
             elif slide.any():
@@ -222,7 +223,7 @@ class Judge:
                 )
                 failures.append(_failure(trace, used, text))
             peak = float(np.abs(trace.w_command_C[:, i, N]).max())
-            if held.all() and contact.force_error_rms_n > limits.force_error * peak:
+            if not lost.any() and contact.force_error_rms_n > limits.force_error * peak:
                 text = (
                     f"Contact {name} followed its commanded normal force only to "
                     f"{contact.force_error_rms_n:.3g} N RMS "

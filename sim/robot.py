@@ -131,6 +131,7 @@ def pinocchio_model(scene: mujoco.MjModel) -> pin.Model:
             kind = pin.JointModelRevoluteUnaligned if hinge else pin.JointModelPrismaticUnaligned
             name = scene.joint(j).name
             joint = model.addJoint(joint, kind(scene.jnt_axis[j]), placement * anchor, name)
+            model.armature[model.joints[joint].idx_v] = scene.dof_armature[scene.jnt_dofadr[j]]
             placement = anchor.inverse()
         joint_of[body], X_JB[body] = joint, placement
         model.appendBodyToJoint(

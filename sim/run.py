@@ -76,19 +76,19 @@ def execute(request: Request, progress: Progress | None = None) -> Result:
     robot = loop.robot
     judge = Judge(scenario, robot.joints, robot.tau_min, robot.tau_max)
     recorder = None
-    if out is not None:
-        viewer_url = open_viewer() if request.live else None
-        out.mkdir(parents=True, exist_ok=True)
-        config = resolved_config(request)
-        _write_json(out / CONFIG, config)
-        limits = robot.tau_min, robot.tau_max
-        recorder = Recorder(
-            out / RECORDING, scenario, config, robot.joints, *limits, viewer_url=viewer_url
-        )
     histories: list[ContactHistory] = []
     error: str | None = None
-    started = time.perf_counter()
-    with _StopSignal() as stop:
+    viewer_url = open_viewer() if request.live and out is not None else None
+    with _StopSignal() as stop:  # from the first file to the last, so that none is missing
+        if out is not None:
+            out.mkdir(parents=True, exist_ok=True)
+            config = resolved_config(request)
+            _write_json(out / CONFIG, config)
+            limits = robot.tau_min, robot.tau_max
+            recorder = Recorder(
+                out / RECORDING, scenario, config, robot.joints, *limits, viewer_url=viewer_url
+            )
+        started = time.perf_counter()
         try:
             for block in loop.run():
                 histories.append(monitor.update(block))
@@ -100,21 +100,21 @@ def execute(request: Request, progress: Progress | None = None) -> Result:
                     break
         except PhysicsError as diverged:
             error = f"The simulation diverged at {loop.steps} steps: {diverged}."
-    info = RunInfo(
-        controller=request.controller,
-        objective=request.control.objective,
-        seed=request.seed,
-        wall_s=time.perf_counter() - started,
-        interrupted=stop.requested,
-        error=error,
-        recording=None if out is None else RECORDING,
-    )
-    history = ContactHistory.concatenate(histories)
-    trace = loop.trace.rows(0, len(history.kept))
-    report = judge.report(info, trace, history)
-    if out is not None and recorder is not None:
-        _write_json(out / REPORT, dataclasses.asdict(report))
-        recorder.close(markdown(report))
+        info = RunInfo(
+            controller=request.controller,
+            objective=request.control.objective,
+            seed=request.seed,
+            wall_s=time.perf_counter() - started,
+            interrupted=stop.requested,
+            error=error,
+            recording=None if out is None else RECORDING,
+        )
+        history = ContactHistory.concatenate(histories)
+        trace = loop.trace.rows(0, len(history.kept))
+        report = judge.report(info, trace, history)
+        if out is not None and recorder is not None:
+            _write_json(out / REPORT, dataclasses.asdict(report))
+            recorder.close(markdown(report))
     return Result(report, trace, history)
 
 

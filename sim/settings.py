@@ -7,6 +7,9 @@ from dataclasses import dataclass, replace
 
 from synthesis import InvalidInputError, Objective
 
+# A trace takes about 2 kB per step: a gigabyte in this time [s].
+_LONGEST_S = 600.0
+
 
 @dataclass(frozen=True)
 class Timing:
@@ -19,8 +22,10 @@ class Timing:
     def __post_init__(self) -> None:
         for name in ("grip_s", "tilt_s", "hold_s"):
             value = getattr(self, name)
-            if not (math.isfinite(value) and value > 0.0):
-                raise InvalidInputError(f"timing.{name}", value, "a finite duration > 0 s")
+            if not 0.0 < value <= _LONGEST_S:
+                raise InvalidInputError(
+                    f"timing.{name}", value, f"a duration > 0 s and <= {_LONGEST_S:g} s"
+                )
 
     @property
     def total_s(self) -> float:

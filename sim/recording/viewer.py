@@ -19,8 +19,13 @@ from synthesis import FulcrumError, InvalidInputError
 
 _PACKAGES = "mesa-vulkan-drivers libvulkan1 libegl1 libegl-mesa0 libgl1-mesa-dri"
 _NO_WINDOW = "the Rerun viewer could not open a window on this machine."
+_NO_DRAWING = (
+    "screenshot: the headless viewer did not start or broke off; it needs a Vulkan driver "
+    f"(Debian: apt-get install {_PACKAGES})."
+)
 _RERUN = (sys.executable, "-m", "rerun")
 _SIZE = "1920x1080"
+_MAGIC = b"RRF2"  # how a recording begins
 _LOADING_S = 60.0
 _POLL_S = 0.2
 # A view that has just got its data needs some frames until textures and legends stand.
@@ -38,11 +43,16 @@ def recording_file(run: Path) -> Path:
         InvalidInputError: There is none.
     """
     path = run / "run.rrd" if run.is_dir() else run
-    if path.suffix != ".rrd" or not path.is_file():
+    if path.suffix != ".rrd" or not path.is_file() or not _is_recording(path):
         raise InvalidInputError(
             "recording", str(run), "a folder that `fulcrum run` wrote, or an .rrd file"
         )
     return path
+
+
+def _is_recording(path: Path) -> bool:
+    with path.open("rb") as file:
+        return file.read(len(_MAGIC)) == _MAGIC
 
 
 def view(run: Path) -> None:
@@ -93,11 +103,10 @@ def headless_viewer() -> Iterator[ViewerClient]:
     try:
         client = _connect(process, url)
         if client is None:
-            raise ViewerError(
-                "screenshot: the headless viewer did not start; it needs a Vulkan driver "
-                f"(Debian: apt-get install {_PACKAGES})."
-            )
+            raise ViewerError(_NO_DRAWING)
         yield client
+    except (RuntimeError, ConnectionError) as died:
+        raise ViewerError(_NO_DRAWING) from died
     finally:
         # The viewer is a child of the process that was started: both must go.
         with contextlib.suppress(ProcessLookupError):
@@ -111,7 +120,7 @@ def _start(*options: str) -> tuple[subprocess.Popen[bytes], str]:
         probe.bind(("127.0.0.1", 0))
         port = probe.getsockname()[1]
     process = subprocess.Popen(
-        [*_RERUN, "--port", str(port), *options],
+        [*_RERUN, "--bind", "127.0.0.1", "--port", str(port), *options],
         stdout=subprocess.DEVNULL,
         stderr=subprocess.DEVNULL,
         start_new_session=True,

@@ -1,0 +1,177 @@
+"""The house's order: which way imports run, who steps, who records, and what files look like."""
+
+import ast
+import re
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parent.parent
+PACKAGES = ("assets", "scenarios", "sim", "synthesis")
+# What each package may import of the others; the way of the data is scenarios -> sim -> synthesis.
+ALLOWED = {
+    "scenarios": {"sim", "synthesis", "assets"},
+    "sim": {"synthesis", "assets"},
+    "synthesis": {"assets"},
+    "assets": set(),
+}
+SIMULATORS = {"mujoco", "dm_control", "dm_env", "mink", "pinocchio", "rerun"}
+STEPS = {"mj_step", "mj_step1", "mj_step2"}
+MAX_LINES = 350
+# Names of MuJoCo and Rerun for a cuboid; nothing else in `synthesis` and `sim` may say the words.
+API_WORDS = re.compile(
+    r"mjGEOM_BOX\b|Boxes3D\b|\"box\"|plane, sphere, capsule, ellipsoid, cylinder, box\b"
+)
+FILES = sorted(path for package in PACKAGES for path in (ROOT / package).rglob("*.py"))
+
+
+def name(path):
+    return path.relative_to(ROOT).as_posix()
+
+
+def imported(source):
+    """Dotted names of all modules that a source imports, wherever in it the import stands."""
+    modules = set()
+    for node in ast.walk(ast.parse(source)):
+        if isinstance(node, ast.Import):
+            modules |= {alias.name for alias in node.names}
+        elif isinstance(node, ast.ImportFrom):
+            base = "." * node.level + (node.module or "")
+            modules |= {base} | {f"{base}.{alias.name}" for alias in node.names}
+    return modules
+
+
+def packages_imported(source):
+    return {module.split(".")[0] for module in imported(source)}
+
+
+def against_the_arrows(path, source):
+    """Packages of the house that a file imports but may not; relative imports hide them."""
+    own = path.split("/")[0]
+    found = packages_imported(source)
+    return (found & set(PACKAGES)) - ALLOWED[own] - {own} | (found & {""})
+
+
+def steps_taken(source):
+    """Calls in a source that advance MuJoCo: its step functions, or `step` of a physics."""
+    calls = []
+    for node in ast.walk(ast.parse(source)):
+        if isinstance(node, ast.Attribute) and node.attr in STEPS:
+            calls.append(node.attr)
+        if isinstance(node, ast.ImportFrom):
+            calls += [alias.name for alias in node.names if alias.name in STEPS]
+        if isinstance(node, ast.Call) and isinstance(node.func, ast.Attribute):
+            owner = ast.unparse(node.func.value).lower()
+            if node.func.attr == "step" and owner.split(".")[-1].endswith("physics"):
+                calls.append(f"{owner}.step")
+    return calls
+
+
+def forbidden_words(source):
+    return re.findall(r"box|baxter", API_WORDS.sub("", source), re.IGNORECASE)
+
+
+def module_docstring(source):
+    return ast.get_docstring(ast.parse(source))
+
+
+def test_every_package_is_looked_at():
+    # Guards the tests below against an empty list of files.
+    assert {path.relative_to(ROOT).parts[0] for path in FILES} == set(PACKAGES)
+    assert len(FILES) > 30
+
+
+@pytest.mark.parametrize("path", FILES, ids=name)
+def test_imports_run_one_way(path):
+    assert against_the_arrows(name(path), path.read_text()) == set()
+
+
+@pytest.mark.parametrize(
+    ("path", "source", "caught"),
+    [
+        ("sim/loop.py", "from scenarios import scenario", {"scenarios"}),
+        ("synthesis/conic.py", "def f():\n    import sim.plant", {"sim"}),
+        ("assets/visuals.py", "from synthesis.errors import FulcrumError", {"synthesis"}),
+        ("sim/loop.py", "from ..scenarios import scenario", {""}),
+        ("scenarios/cli.py", "from sim.run import execute", set()),
+        ("sim/ik.py", "from sim.path import ScrewPath\nimport assets", set()),
+    ],
+)
+def test_imports_against_the_arrows_are_caught(path, source, caught):
+    assert against_the_arrows(path, source) == caught
+
+
+def test_only_the_recording_imports_rerun():
+    importers = {name(p) for p in FILES if "rerun" in packages_imported(p.read_text())}
+    assert importers
+    assert all(path.startswith("sim/recording/") for path in importers)
+
+
+def test_synthesis_imports_no_simulator_and_no_recorder():
+    for path in FILES:
+        if name(path).startswith("synthesis/"):
+            assert not packages_imported(path.read_text()) & SIMULATORS, name(path)
+
+
+def test_an_import_inside_a_function_or_of_a_part_is_caught():
+    assert packages_imported("def f():\n    from rerun.experimental import X") == {"rerun"}
+    assert packages_imported("if TYPE_CHECKING:\n    import mujoco") == {"mujoco"}
+
+
+def test_only_the_plant_steps_mujoco():
+    assert {name(p) for p in FILES if steps_taken(p.read_text())} == {"sim/plant.py"}
+
+
+@pytest.mark.parametrize(
+    "source",
+    [
+        "mujoco.mj_step(model, data)",
+        "from mujoco import mj_step2",
+        "advance = mujoco.mj_step1",
+        "self.plant.physics.step()",
+        "self._physics.step(3)",
+    ],
+)
+def test_a_step_elsewhere_is_caught(source):
+    assert steps_taken(source)
+
+
+def test_a_plant_and_an_environment_are_no_steps_of_mujoco():
+    assert steps_taken("plant.step()\nenvironment.step(action)\nmujoco.mj_kinematics(m, d)") == []
+
+
+def test_neither_synthesis_nor_sim_knows_the_words_box_and_baxter():
+    for path in FILES:
+        if name(path).startswith(("synthesis/", "sim/")):
+            assert forbidden_words(path.read_text()) == [], name(path)
+
+
+@pytest.mark.parametrize(
+    "source",
+    ["# the Box slides", "BAXTER = 1", "mailbox = 2", "'box'", 'name="box-tilt"', "mjGEOM_BOXES"],
+)
+def test_the_words_are_caught(source):
+    assert forbidden_words(source)
+
+
+def test_names_of_mujoco_and_rerun_for_a_cuboid_are_allowed():
+    assert forbidden_words('rr.Boxes3D(); mjtGeom.mjGEOM_BOX; kind="box"') == []
+
+
+@pytest.mark.parametrize("path", FILES, ids=name)
+def test_every_module_says_what_it_is_for(path):
+    assert module_docstring(path.read_text())
+
+
+def test_a_module_without_docstring_is_caught():
+    assert not module_docstring("# only a comment\nx = 1")
+
+
+def test_files_have_at_most_350_lines():
+    lengths = {name(path): len(path.read_text().splitlines()) for path in FILES}
+    assert {path: n for path, n in lengths.items() if n > MAX_LINES} == {}
+
+
+def test_every_package_is_typed():
+    for package in PACKAGES:
+        assert (ROOT / package / "py.typed").is_file(), package

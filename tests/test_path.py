@@ -1,0 +1,287 @@
+"""The object's path is a screw motion, its tilt is read back, and its timing starts and stops."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy.linalg import expm
+from scipy.spatial.transform import Rotation
+
+from scenarios import scenario
+from sim.path import Schedule, ScrewPath, minimum_jerk, rotation
+from sim.scenario import Pivot, Pose
+from sim.settings import Timing
+from synthesis import InvalidInputError
+
+# Positions are of the order of 1 m and angles of 1 rad: a few roundings of 2e-16 each.
+ROUNDING = 1e-13
+TIMING = Timing(grip_s=0.7, tilt_s=5.0, hold_s=0.4)
+END = np.radians(80.0)
+
+unit_floats = st.floats(-1.0, 1.0)
+vectors = st.tuples(unit_floats, unit_floats, unit_floats)
+# Short vectors have no well-defined direction.
+directions = vectors.filter(lambda v: np.linalg.norm(v) > 0.1)
+rotation_vectors = vectors.map(Rotation.from_rotvec)
+poses = st.builds(
+    lambda p, turn: Pose(p, tuple(turn.as_quat(scalar_first=True).tolist())),
+    vectors,
+    rotation_vectors,
+)
+pivots = st.builds(Pivot, start=poses, point_W=vectors, axis_W=directions, pitch=unit_floats)
+tilts = st.floats(np.radians(-170.0), np.radians(170.0))
+exhaustive = settings(derandomize=True, deadline=None, max_examples=100)
+
+
+def homogeneous(R, p):
+    return np.block([[R, p[:, None]], [np.zeros((1, 3)), np.ones((1, 1))]])
+
+
+def exponential(pivot, tilt):
+    """The pose by the matrix exponential of the screw, independent of rotation vectors."""
+    axis = np.array(pivot.axis_W) / np.linalg.norm(pivot.axis_W)
+    screw = np.zeros((4, 4))
+    screw[:3, :3] = np.cross(np.eye(3), axis)
+    screw[:3, 3] = -np.cross(axis, pivot.point_W) + pivot.pitch * axis
+    start = homogeneous(rotation(pivot.start).as_matrix(), np.array(pivot.start.position))
+    return expm(screw * tilt) @ start
+
+
+def quaternion(R):
+    return Rotation.from_matrix(R).as_quat(scalar_first=True)
+
+
+# --- the screw motion ---
+
+
+@exhaustive
+@given(pivots)
+def test_pose_at_zero_tilt_is_the_start(pivot):
+    R, p = ScrewPath(pivot).pose(0.0)
+    np.testing.assert_allclose(R, rotation(pivot.start).as_matrix(), rtol=0, atol=ROUNDING)
+    np.testing.assert_allclose(p, pivot.start.position, rtol=0, atol=ROUNDING)
+
+
+@exhaustive
+@given(pivots, tilts)
+def test_pose_is_the_exponential_of_the_screw(pivot, tilt):
+    pose = homogeneous(*ScrewPath(pivot).pose(tilt))
+    np.testing.assert_allclose(pose, exponential(pivot, tilt), rtol=0, atol=ROUNDING)
+
+
+def test_a_point_or_pitch_off_by_a_millimetre_is_caught_by_the_exponential():
+    pivot = scenario("box-tilt").path
+    shifted = replace(pivot, point_W=(pivot.point_W[0] + 1e-3, *pivot.point_W[1:]))
+    for tampered in (shifted, replace(pivot, pitch=1e-3)):
+        pose = homogeneous(*ScrewPath(tampered).pose(1.0))
+        # The point moves by 2 sin(1/2) times its error, the pitch by its error.
+        assert np.abs(pose - exponential(pivot, 1.0)).max() > 5e-4
+
+
+@exhaustive
+@given(pivots, tilts)
+def test_motion_is_rigid(pivot, tilt):
+    R, _ = ScrewPath(pivot).pose(tilt)
+    np.testing.assert_allclose(R @ R.T, np.eye(3), rtol=0, atol=ROUNDING)
+    assert np.linalg.det(R) > 0.0
+
+
+@exhaustive
+@given(pivots, tilts, unit_floats)
+def test_axis_points_only_advance_by_the_pitch(pivot, tilt, along):
+    path = ScrewPath(pivot)
+    on_axis = np.array(pivot.point_W) + along * path.axis
+    R_0, p_0 = path.pose(0.0)
+    R, p = path.pose(tilt)
+    moved = R @ R_0.T @ (on_axis - p_0) + p
+    np.testing.assert_allclose(
+        moved, on_axis + pivot.pitch * tilt * path.axis, rtol=0, atol=ROUNDING
+    )
+
+
+@exhaustive
+@given(pivots, tilts)
+def test_a_point_off_the_axis_moves_by_the_chord(pivot, tilt):
+    path = ScrewPath(replace(pivot, pitch=0.0))
+    radius = np.cross(path.axis, [0.6, -0.8, 0.3])
+    off_axis = np.array(pivot.point_W) + radius
+    R_0, p_0 = path.pose(0.0)
+    R, p = path.pose(tilt)
+    moved = R @ R_0.T @ (off_axis - p_0) + p
+    chord = 2.0 * abs(np.sin(tilt / 2.0)) * np.linalg.norm(radius)
+    assert np.linalg.norm(moved - off_axis) == pytest.approx(chord, abs=ROUNDING)
+
+
+def test_box_stands_on_its_near_face_after_a_quarter_turn():
+    R, p = ScrewPath(scenario("box-tilt").path).pose(np.pi / 2.0)
+    np.testing.assert_allclose(p, [0.45, 0.0, 0.15], rtol=0, atol=ROUNDING)
+    np.testing.assert_allclose(R @ [1.0, 0.0, 0.0], [0.0, 0.0, 1.0], rtol=0, atol=ROUNDING)
+
+
+def test_turning_about_the_opposite_axis_is_caught_below_the_table():
+    pivot = scenario("box-tilt").path
+    opposite = tuple(-x for x in pivot.axis_W)
+    assert ScrewPath(replace(pivot, axis_W=opposite)).pose(np.pi / 2.0)[1][2] < -0.1
+
+
+@pytest.mark.parametrize(
+    "axis", [(0.0, 0.0, 0.0), (np.nan, 0.0, 1.0), (np.inf, 0.0, 1.0), (0.0, -np.inf, 0.0)]
+)
+def test_an_axis_that_is_no_direction_is_refused(axis):
+    with pytest.raises(InvalidInputError, match=r"path\.axis_W: got .*; valid is a finite vector"):
+        ScrewPath(replace(scenario("box-tilt").path, axis_W=axis))
+
+
+@pytest.mark.parametrize("angle_deg", [0.0, -30.0, 180.0, np.nan, np.inf])
+def test_an_angle_that_cannot_be_followed_is_refused(angle_deg):
+    with pytest.raises(InvalidInputError, match=r"path\.angle_deg: got .*; valid is"):
+        ScrewPath(replace(scenario("box-tilt").path, angle_deg=angle_deg))
+
+
+@pytest.mark.parametrize(
+    ("field", "change"),
+    [
+        ("point_W", {"point_W": (np.nan, 0.0, 0.0)}),
+        ("pitch", {"pitch": np.inf}),
+        ("start.position", {"start": Pose((0.0, -np.inf, 0.0))}),
+        ("start.quaternion", {"start": Pose(quaternion=(np.nan, 0.0, 0.0, 0.0))}),
+    ],
+)
+def test_a_path_that_is_no_number_is_refused_by_name(field, change):
+    with pytest.raises(InvalidInputError, match=rf"path\.{field}: got .*; valid is finite numbers"):
+        ScrewPath(replace(scenario("box-tilt").path, **change))
+
+
+# --- the tilt that is read back ---
+
+
+@exhaustive
+@given(pivots, tilts)
+def test_tilt_inverts_pose(pivot, tilt):
+    path = ScrewPath(pivot)
+    q = quaternion(path.pose(tilt)[0])
+    # Ten times the rounding: the matrix's largest quaternion component is divided by.
+    assert path.tilt(q) == pytest.approx(tilt, abs=10.0 * ROUNDING)
+    assert path.tilt(-q) == pytest.approx(tilt, abs=10.0 * ROUNDING)
+
+
+@exhaustive
+@given(pivots, tilts, directions, st.floats(-1.0, 1.0), st.booleans())
+def test_swing_about_an_axis_across_does_not_count_as_tilt(pivot, tilt, direction, angle, before):
+    path = ScrewPath(pivot)
+    across = np.cross(path.axis, direction)
+    swing = Rotation.from_rotvec(angle * across)
+    turn = Rotation.from_rotvec(tilt * path.axis)
+    # The swing may come before or after the tilt.
+    moved = (turn * swing if before else swing * turn) * rotation(pivot.start)
+    # Near a half turn with much swing the twist is the angle of a short vector (cos 85 deg).
+    found = path.tilt(moved.as_quat(scalar_first=True))
+    assert found == pytest.approx(tilt, abs=100.0 * ROUNDING)
+
+
+@exhaustive
+@given(pivots, tilts, directions, st.floats(-0.01, 0.01))
+def test_a_small_oblique_turn_counts_by_its_share_about_the_axis(pivot, tilt, direction, angle):
+    path = ScrewPath(pivot)
+    disturbance = angle * np.array(direction)
+    turn = Rotation.from_rotvec(disturbance) * Rotation.from_rotvec(tilt * path.axis)
+    found = path.tilt((turn * rotation(pivot.start)).as_quat(scalar_first=True))
+    # What is left is of second order in the disturbance, of length sqrt(3) * angle at most.
+    expected = tilt + disturbance @ path.axis
+    assert found == pytest.approx(expected, abs=3.0 * angle**2 + 10.0 * ROUNDING)
+
+
+def test_tilt_of_an_array_is_the_tilt_of_each():
+    path = ScrewPath(scenario("box-tilt").path)
+    angles = np.random.default_rng(0).uniform(-2.9, 2.9, (3, 5))
+    q = np.array([[quaternion(path.pose(a)[0]) for a in row] for row in angles])
+    np.testing.assert_array_equal(path.tilt(q), [[path.tilt(one) for one in row] for row in q])
+    np.testing.assert_allclose(path.tilt(q), angles, rtol=0, atol=10.0 * ROUNDING)
+
+
+# --- the timing ---
+
+
+def derivatives_at_ends(profile, h=1e-4):
+    """Position, speed and acceleration by one-sided differences at both ends, (2, 3)."""
+    rows = []
+    for end, step in ((0.0, h), (1.0, -h)):
+        x = profile(end + step * np.arange(3))
+        rows.append([x[0], (x[1] - x[0]) / step, (x[2] - 2.0 * x[1] + x[0]) / h**2])
+    return np.array(rows)
+
+
+def test_minimum_jerk_starts_and_ends_at_rest_without_acceleration():
+    position, speed, acceleration = derivatives_at_ends(lambda x: minimum_jerk(x)[0]).T
+    np.testing.assert_array_equal(position, [0.0, 1.0])
+    # Near the ends the profile is 10 x^3: differences over h = 1e-4 leave 10 h^2 and 60 h, and
+    # rounding of 1 over h^2 another 1e-7.
+    np.testing.assert_allclose(speed, 0.0, rtol=0, atol=1.1 * 10.0 * 1e-8)
+    np.testing.assert_allclose(acceleration, 0.0, rtol=0, atol=1.1 * 60.0 * 1e-4)
+
+
+def test_a_cubic_profile_is_caught_by_its_acceleration():
+    acceleration = derivatives_at_ends(lambda x: x**2 * (3.0 - 2.0 * x))[:, 2]
+    np.testing.assert_allclose(np.abs(acceleration), 6.0, rtol=1e-2)
+
+
+def test_minimum_jerk_velocity_is_the_derivative_and_never_negative():
+    x, h = np.linspace(0.001, 0.999, 1000), 1e-5
+    slope = (minimum_jerk(x + h)[0] - minimum_jerk(x - h)[0]) / (2.0 * h)
+    # Third derivative 60 times h^2 / 6 = 1e-9; rounding of 1 over 2 h = 1e-11.
+    np.testing.assert_allclose(minimum_jerk(x)[1], slope, rtol=0, atol=2e-9)
+    assert (minimum_jerk(x)[1] > 0.0).all()
+
+
+def test_minimum_jerk_stays_at_its_ends_outside_the_interval():
+    np.testing.assert_array_equal(minimum_jerk(np.array([-2.0, 0.0, 1.0, 5.0]))[0], [0, 0, 1, 1])
+    np.testing.assert_array_equal(minimum_jerk(np.array([-2.0, 0.0, 1.0, 5.0]))[1], 0.0)
+
+
+def test_phases_follow_each_other_at_the_ends_of_their_durations():
+    schedule = Schedule(TIMING, END)
+    times = [0.0, 0.69, 0.7, 5.69, 5.7, 6.1]
+    expected = ["grip", "grip", "tilt", "tilt", "hold", "hold"]
+    assert [schedule.phase(t) for t in times] == expected
+    assert schedule.settled_s == 0.7
+
+
+def test_reference_rests_while_gripping_and_holding_and_rises_between():
+    schedule = Schedule(TIMING, END)
+    rests = np.array([0.0, 0.35, 0.7, 5.7, 6.1])
+    tilt, rate = schedule.tilt(rests)
+    # 5.7 s - 0.7 s is not exactly 5 s.
+    np.testing.assert_allclose(tilt, [0.0, 0.0, 0.0, END, END], rtol=0, atol=1e-15)
+    np.testing.assert_allclose(rate, 0.0, rtol=0, atol=1e-15)
+    assert (np.diff(schedule.tilt(np.linspace(0.71, 5.69, 500))[0]) > 0.0).all()
+
+
+def test_grip_is_built_up_before_the_tilt_starts():
+    share = Schedule(TIMING, END).grip(np.array([0.0, 0.35, 0.7, 3.0, 6.1]))
+    np.testing.assert_allclose(share, [0.0, 0.5, 1.0, 1.0, 1.0], rtol=0, atol=1e-15)
+
+
+def test_rate_is_the_derivative_of_the_tilt():
+    schedule = Schedule(TIMING, END)
+    t, h = np.linspace(0.01, 6.09, 1000), 1e-5
+    slope = (schedule.tilt(t + h)[0] - schedule.tilt(t - h)[0]) / (2.0 * h)
+    # As for the profile; 80 deg over 5 s make the derivatives smaller.
+    np.testing.assert_allclose(schedule.tilt(t)[1], slope, rtol=0, atol=2e-9)
+    # A millisecond's delay is caught.
+    assert np.abs(schedule.tilt(t + 1e-3)[1] - slope).max() > 1e-5
+
+
+def test_times_invert_the_reference_tilt():
+    schedule = Schedule(TIMING, END)
+    angles = np.linspace(0.0, END, 200)
+    times = schedule.times(angles)
+    assert (np.diff(times) > 0.0).all()
+    assert times[0] == TIMING.grip_s
+    # Linear interpolation over dt = 0.5 ms: dt^2 / 8 times the largest acceleration,
+    # 5.77 * END / tilt_s^2 = 0.32 rad/s^2.
+    bound = 0.33 * 0.0005**2 / 8.0
+    np.testing.assert_allclose(schedule.tilt(times)[0], angles, rtol=0, atol=bound)
+    # A millisecond's delay is caught.
+    assert np.abs(schedule.tilt(times + 1e-3)[0] - angles).max() > 100.0 * bound

@@ -1,0 +1,364 @@
+"""The controller's robot is the plant's robot: Pinocchio's belief against MuJoCo's own numbers."""
+
+from dataclasses import replace
+from functools import cache
+
+import mujoco
+import numpy as np
+import pinocchio as pin
+import pytest
+from scipy.spatial.transform import Rotation
+
+from scenarios import scenario, scenarios
+from sim.robot import RobotModel, pinocchio_model
+from sim.scenario import Pose
+from sim.scene import compose, hand_body
+
+BOX = scenario("box-tilt")
+# Double precision over a chain of ten frames; the largest numbers are ~1e2 N·m. Measured: 6e-14.
+ROUNDING = 1e-12
+SAMPLES = 20
+
+each_scenario = pytest.mark.parametrize("name", scenarios())
+
+
+@cache
+def robot(name):
+    return RobotModel(scenario(name))
+
+
+def plant_model(scene):
+    return compose(scene).compile()
+
+
+def dofs_of(model, belief):
+    return [int(model.joint(name).dofadr[0]) for name in belief.joints]
+
+
+def sampled_positions(belief, count=SAMPLES):
+    return np.random.default_rng(1).uniform(belief.q_min, belief.q_max, (count, len(belief.joints)))
+
+
+def sampled_contacts(count):
+    """Arbitrary contact points [m] and axes: the belief must not depend on where they are."""
+    rng = np.random.default_rng(2)
+    return rng.uniform(-1.0, 1.0, (count, 3)), Rotation.random(count, rng=rng).as_matrix()
+
+
+def mujoco_facts(model, scene, belief):
+    """Gravity, mass matrix and contact Jacobians by MuJoCo at sampled positions."""
+    dofs = dofs_of(model, belief)
+    addresses = [int(model.joint(name).qposadr[0]) for name in belief.joints]
+    data = mujoco.MjData(model)
+    p_WC, R_WC = sampled_contacts(len(scene.hands))
+    gravity, mass, jacobians = [], [], []
+    for q in sampled_positions(belief):
+        data.qpos[addresses] = q
+        mujoco.mj_forward(model, data)
+        gravity.append(data.qfrc_bias[dofs])
+        full = np.zeros((model.nv, model.nv))
+        mujoco.mj_fullM(model, data, full)
+        mass.append(full[np.ix_(dofs, dofs)])
+        for hand, p, R in zip(scene.hands, p_WC, R_WC, strict=True):
+            J = np.zeros((2, 3, model.nv))
+            mujoco.mj_jac(model, data, J[0], J[1], p, model.body(hand_body(hand)).id)
+            jacobians.append(np.concatenate([R.T @ J[0][:, dofs], R.T @ J[1][:, dofs]]))
+    return {
+        "gravity": np.array(gravity),
+        "mass": np.array(mass),
+        "jacobians": np.array(jacobians),
+    }
+
+
+def belief_facts(belief, hands):
+    """The same by the belief."""
+    p_WC, R_WC = sampled_contacts(hands)
+    gravity, mass, jacobians = [], [], []
+    for q in sampled_positions(belief):
+        belief.update(q)
+        gravity.append(belief.gravity())
+        mass.append(belief.mass_matrix())
+        jacobians.extend(belief.contact_jacobians(p_WC, R_WC))
+    return {
+        "gravity": np.array(gravity),
+        "mass": np.array(mass),
+        "jacobians": np.array(jacobians),
+    }
+
+
+def deviation(scene, model, belief):
+    """Largest absolute difference of each fact between the belief and a MuJoCo model [SI]."""
+    expected = mujoco_facts(model, scene, belief)
+    found = belief_facts(belief, len(scene.hands))
+    return {key: float(np.abs(found[key] - expected[key]).max()) for key in expected}
+
+
+# --- the composed robot ---
+
+
+@each_scenario
+def test_belief_agrees_with_mujoco(name):
+    scene = scenario(name)
+    found = deviation(scene, plant_model(scene), robot(name))
+    assert max(found.values()) < ROUNDING, found
+
+
+def heavier_wrist(spec):
+    spec.body("left_wrist").mass *= 1.01
+
+
+def longer_hand(spec):
+    spec.site("left_tip_center").pos[2] += 1e-3
+    spec.body("left_hand_link").pos[2] += 1e-3
+
+
+def geared_elbow(spec):
+    spec.joint("left_e1").armature = 1e-2
+
+
+@pytest.mark.parametrize(
+    ("tamper", "fact", "at_least"),
+    [
+        (heavier_wrist, "gravity", 1e-2),  # 34 mN more weight at up to 1 m
+        (heavier_wrist, "mass", 1e-4),
+        (longer_hand, "gravity", 1e-3),  # 2 N of hand, 1 mm further out
+        (geared_elbow, "mass", 9e-3),
+    ],
+)
+def test_a_tampered_plant_is_caught(tamper, fact, at_least):
+    spec = compose(BOX)
+    tamper(spec)
+    assert deviation(BOX, spec.compile(), robot("box-tilt"))[fact] > at_least
+
+
+@each_scenario
+def test_joints_and_limits_are_in_the_order_of_the_motors(name):
+    belief, model = robot(name), plant_model(scenario(name))
+    motors = [model.joint(int(j)).name for j in model.actuator_trnid[:, 0]]
+    assert list(belief.joints) == motors
+    assert set(motors) == set(scenario(name).robot.posture)
+    np.testing.assert_array_equal(
+        np.column_stack([belief.tau_min, belief.tau_max]), model.actuator_ctrlrange
+    )
+    for i, joint in enumerate(motors):
+        assert (belief.q_min[i], belief.q_max[i]) == tuple(model.joint(joint).range)
+        assert belief.qd_max[i] == model.joint(joint).user[0] > 0.0
+        assert belief.damping[i] == model.joint(joint).damping[0]
+
+
+def test_baxter_s_limits_are_the_official_ones():
+    belief = robot("box-tilt")
+    limits = dict(zip(belief.joints, belief.tau_max.tolist(), strict=True))
+    for side in ("left", "right"):
+        arm = [limits[f"{side}_{j}"] for j in ("s0", "s1", "e0", "e1", "w0", "w1", "w2")]
+        assert arm == [50.0, 50.0, 50.0, 50.0, 15.0, 15.0, 15.0]
+    np.testing.assert_array_equal(belief.tau_min, -belief.tau_max)
+
+
+def test_joints_of_a_problem_are_the_belief_s():
+    belief = robot("box-tilt")
+    belief.update(sampled_positions(belief, 1)[0])
+    p_WC, R_WC = sampled_contacts(2)
+    joints = belief.statics(p_WC, R_WC)
+    assert joints.names == belief.joints
+    np.testing.assert_array_equal(joints.J_C, belief.contact_jacobians(p_WC, R_WC))
+    np.testing.assert_array_equal(joints.tau_g, belief.gravity())
+    np.testing.assert_array_equal(joints.tau_min, belief.tau_min)
+    np.testing.assert_array_equal(joints.tau_max, belief.tau_max)
+
+
+# --- what the Jacobian means ---
+
+
+def moved_points(model, belief, scene, q, p_WC, q_C):
+    """Where the hands' points that are at p_WC at angles q_C come to be at angles q, (n, 3)."""
+    data = mujoco.MjData(model)
+    addresses = [int(model.joint(name).qposadr[0]) for name in belief.joints]
+    bodies = [model.body(hand_body(hand)).id for hand in scene.hands]
+    data.qpos[addresses] = q_C
+    mujoco.mj_kinematics(model, data)
+    offsets = np.einsum("nji,nj->ni", data.xmat[bodies].reshape(-1, 3, 3), p_WC - data.xpos[bodies])
+    data.qpos[addresses] = q
+    mujoco.mj_kinematics(model, data)
+    return data.xpos[bodies] + np.einsum("nij,nj->ni", data.xmat[bodies].reshape(-1, 3, 3), offsets)
+
+
+@each_scenario
+def test_jacobian_is_the_derivative_of_the_forward_kinematics(name):
+    scene, belief = scenario(name), robot(name)
+    model, h = plant_model(scene), 1e-5
+    q = sampled_positions(belief, 1)[0]
+    p_WC, R_WC = sampled_contacts(len(scene.hands))
+    belief.update(q)
+    J_C = belief.contact_jacobians(p_WC, R_WC)
+    for j in range(len(belief.joints)):
+        step = h * np.eye(len(belief.joints))[j]
+        ahead = moved_points(model, belief, scene, q + step, p_WC, q)
+        behind = moved_points(model, belief, scene, q - step, p_WC, q)
+        expected = np.einsum("nji,nj->ni", R_WC, (ahead - behind) / (2.0 * h))
+        # Lever times h^2 / 6 is 4e-11; rounding of 1 m over 2 h is 1e-11.
+        np.testing.assert_allclose(J_C[:, :3, j], expected, rtol=0, atol=2e-10)
+    # A point a millimetre off is caught.
+    shifted = belief.contact_jacobians(p_WC + np.array([0.0, 0.0, 1e-3]), R_WC)
+    assert np.abs(shifted - J_C).max() > 5e-4
+
+
+@each_scenario
+def test_torque_of_a_contact_wrench_is_mujoco_s_and_does_the_same_work(name):
+    scene, belief = scenario(name), robot(name)
+    model = plant_model(scene)
+    data = mujoco.MjData(model)
+    rng = np.random.default_rng(3)
+    q, qd = sampled_positions(belief, 1)[0], rng.normal(size=len(belief.joints))
+    p_WC, R_WC = sampled_contacts(len(scene.hands))
+    wrenches = rng.normal(scale=30.0, size=(len(scene.hands), 6))
+    belief.update(q)
+    joints = belief.statics(p_WC, R_WC)
+    tau = np.einsum("nkl,nk->l", joints.J_C, wrenches)
+    for i, joint in enumerate(belief.joints):
+        data.qpos[model.joint(joint).qposadr[0]] = q[i]
+        data.qvel[model.joint(joint).dofadr[0]] = qd[i]
+    mujoco.mj_forward(model, data)
+    applied, power = np.zeros(model.nv), 0.0
+    for hand, p, R, w in zip(scene.hands, p_WC, R_WC, wrenches, strict=True):
+        body = model.body(hand_body(hand)).id
+        force, moment = R @ w[:3], R @ w[3:]
+        mujoco.mj_applyFT(model, data, force, moment, p, body, applied)
+        twist = np.zeros(6)
+        mujoco.mj_objectVelocity(model, data, mujoco.mjtObj.mjOBJ_XBODY, body, twist, 0)
+        lever = p - data.xpos[body]
+        power += force @ (twist[3:] + np.cross(twist[:3], lever)) + moment @ twist[:3]
+    # Forces of 30 N at levers of 1 m: two digits above the rounding of 1.
+    np.testing.assert_allclose(tau, applied[dofs_of(model, belief)], rtol=0, atol=ROUNDING)
+    assert tau @ qd == pytest.approx(power, abs=10.0 * ROUNDING)
+    # The paper's sign of (13), applied to a plant, does the opposite work.
+    assert abs(-tau @ qd - power) > 1.0
+
+
+# --- other places and other robots ---
+
+
+def test_a_moved_and_turned_base_changes_gravity_as_in_mujoco():
+    turn = Rotation.from_rotvec([0.4, -0.3, 0.8]).as_quat(scalar_first=True)
+    base = Pose((0.1, -0.2, 0.3), tuple(turn.tolist()))
+    moved = replace(BOX, robot=replace(BOX.robot, base=base))
+    belief = RobotModel(moved)
+    found = deviation(moved, plant_model(moved), belief)
+    assert max(found.values()) < ROUNDING, found
+    # Half a radian of lean is caught where the base is believed upright.
+    assert deviation(moved, plant_model(moved), robot("box-tilt"))["gravity"] > 1.0
+    assert deviation(moved, plant_model(moved), robot("box-tilt"))["jacobians"] > 0.1
+
+
+ODD_ROBOT = """
+<mujoco>
+  <compiler angle="radian"/>
+  <option gravity="0.5 -1 -9.81"/>
+  <worldbody>
+    <body name="pillar" pos="0.1 0.2 0.3" quat="0.9 0.1 0.3 0.2">
+      <inertial pos="0 0 0.1" mass="3" diaginertia="0.1 0.1 0.1"/>
+      <body name="swing" pos="0 0 0.4" quat="0.7 0.7 0 0.1">
+        <inertial pos="0.1 0.2 0" quat="0.8 0 0.6 0" mass="1.5" diaginertia="0.02 0.03 0.04"/>
+        <joint name="zeta" type="hinge" axis="1 2 0.5" pos="0.05 -0.1 0.2" armature="0.3"/>
+        <joint name="alpha" type="slide" axis="0 1 1" pos="0.3 0.1 0"/>
+        <body name="welded" pos="0.2 0 0.1" quat="0.6 0 0 0.8">
+          <inertial pos="0 0.1 0" mass="0.7" diaginertia="0.01 0.02 0.02"/>
+          <site name="on_welded" pos="0.1 0.1 0.1" quat="0.5 0.5 0.5 0.5"/>
+          <body name="tip" pos="0 0.3 0">
+            <inertial pos="0 0 0.05" mass="0.4" diaginertia="0.001 0.002 0.002"/>
+            <joint name="mid" type="hinge" axis="0 0 1" pos="0.02 0 0"/>
+            <site name="on_tip" pos="0 0 0.2"/>
+          </body>
+        </body>
+      </body>
+      <body name="rail">
+        <inertial pos="0 0 0" mass="0.9" diaginertia="0.01 0.01 0.01"/>
+        <joint name="beta" type="slide" axis="1 0 0" armature="0.1"/>
+      </body>
+    </body>
+    <body name="thing" pos="1 0 0">
+      <freejoint/>
+      <inertial pos="0 0 0" mass="2" diaginertia="0.1 0.1 0.1"/>
+      <body name="lid" pos="0 0 0.1">
+        <inertial pos="0 0 0" mass="0.2" diaginertia="0.01 0.01 0.01"/>
+        <joint name="lid" type="hinge" axis="0 1 0"/>
+        <site name="on_lid"/>
+      </body>
+    </body>
+    <site name="on_floor" pos="1 2 3"/>
+  </worldbody>
+</mujoco>
+"""
+ODD_JOINTS = ("zeta", "alpha", "mid", "beta")
+
+
+def odd_deviation(model, belief):
+    """Largest difference of gravity, mass matrix, site poses and Jacobians of the odd robot."""
+    rng = np.random.default_rng(4)
+    data, pin_data = mujoco.MjData(model), belief.createData()
+    dofs = [int(model.joint(j).dofadr[0]) for j in ODD_JOINTS]
+    columns = [belief.joints[belief.getJointId(j)].idx_v for j in ODD_JOINTS]
+    worst = dict.fromkeys(("gravity", "mass", "pose", "jacobian"), 0.0)
+
+    def note(fact, found, expected):
+        worst[fact] = max(worst[fact], float(np.abs(found - expected).max()))
+
+    for _ in range(SAMPLES):
+        angles = rng.uniform(-1.5, 1.5, len(ODD_JOINTS))
+        q = np.zeros(belief.nq)
+        q[columns] = angles
+        for joint, angle in zip(ODD_JOINTS, angles, strict=True):
+            data.qpos[model.joint(joint).qposadr[0]] = angle
+        mujoco.mj_forward(model, data)
+        gravity = pin.computeGeneralizedGravity(belief, pin_data, q)
+        note("gravity", gravity[columns], data.qfrc_bias[dofs])
+        full = np.zeros((model.nv, model.nv))
+        mujoco.mj_fullM(model, data, full)
+        mass = np.triu(pin.crba(belief, pin_data, q))
+        mass = mass + np.triu(mass, 1).T
+        note("mass", mass[np.ix_(columns, columns)], full[np.ix_(dofs, dofs)])
+        for site in ("on_welded", "on_tip", "on_floor"):
+            frame = belief.getFrameId(site)
+            J = pin.computeFrameJacobian(
+                belief, pin_data, q, frame, pin.ReferenceFrame.LOCAL_WORLD_ALIGNED
+            )
+            pin.framesForwardKinematics(belief, pin_data, q)
+            placement = pin_data.oMf[frame]
+            note("pose", placement.translation, data.site(site).xpos)
+            note("pose", placement.rotation, data.site(site).xmat.reshape(3, 3))
+            expected = np.zeros((6, model.nv))
+            mujoco.mj_jacSite(model, data, expected[:3], expected[3:], model.site(site).id)
+            note("jacobian", J[:, columns], expected[:, dofs])
+    return worst
+
+
+def test_slides_offsets_several_joints_per_body_and_armatures_are_understood():
+    model = mujoco.MjModel.from_xml_string(ODD_ROBOT)
+    found = odd_deviation(model, pinocchio_model(model))
+    assert max(found.values()) < ROUNDING, found
+
+
+@pytest.mark.parametrize(
+    ("right", "wrong", "fact"),
+    [
+        ('mass="0.4"', 'mass="0.401"', "gravity"),
+        ('pos="0.05 -0.1 0.2"', 'pos="0.05 -0.101 0.2"', "pose"),
+        ('axis="0 1 1"', 'axis="0 1 1.01"', "jacobian"),
+        ('armature="0.3"', 'armature="0.301"', "mass"),
+        ('quat="0.6 0 0 0.8"', 'quat="0.601 0 0 0.8"', "pose"),
+        ('gravity="0.5 -1', 'gravity="0.501 -1', "gravity"),
+    ],
+)
+def test_a_tampered_odd_robot_is_caught(right, wrong, fact):
+    assert ODD_ROBOT.count(right) == 1
+    model = mujoco.MjModel.from_xml_string(ODD_ROBOT)
+    tampered = mujoco.MjModel.from_xml_string(ODD_ROBOT.replace(right, wrong))
+    # A thousandth of numbers of 0.1 to 1.
+    assert odd_deviation(model, pinocchio_model(tampered))[fact] > 1e-4
+
+
+def test_free_bodies_and_what_hangs_on_them_are_left_out():
+    belief = pinocchio_model(mujoco.MjModel.from_xml_string(ODD_ROBOT))
+    assert set(belief.names) == {"universe", *ODD_JOINTS}
+    assert not belief.existFrame("on_lid")
+    assert belief.existFrame("on_tip")

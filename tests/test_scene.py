@@ -1,0 +1,325 @@
+"""The composed scene is what the scenario says, and the committed files are what it composes."""
+
+from dataclasses import replace
+from functools import cache
+
+import mujoco
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+from assets import asset_path
+from scenarios import scenario, scenarios
+from scenarios.scenes import scene_xml
+from sim.scenario import Friction, Geom, Pose
+from sim.scene import ObjectMotion, compose, hand_body, tip_geom, tip_site
+from synthesis import InvalidInputError
+
+BOX = scenario("box-tilt")
+# MJCF is printed with six digits, so that joint angles above 1 rad are off by up to 5e-6 rad and
+# those below by 5e-7 rad, at levers of up to 1.2 m and over seven joints. Measured: 4e-7 m.
+TOUCHING = 1e-5
+
+each_scenario = pytest.mark.parametrize("scene", scenarios().values(), ids=scenarios())
+
+
+@cache
+def composed(name):
+    return compose(scenario(name)).compile()
+
+
+def names(model, kind, count):
+    return [getattr(model, kind)(i).name for i in range(count)]
+
+
+def tip_distances(scene, model, data):
+    """Distances of the hands' tips from the geoms that they touch [m]."""
+    return [
+        mujoco.mj_geomDistance(
+            model, data, model.geom(tip_geom(hand)).id, model.geom(hand.geom).id, 1.0, None
+        )
+        for hand in scene.hands
+    ]
+
+
+# --- the committed files ---
+
+
+@each_scenario
+def test_committed_scene_is_what_the_scenario_makes(scene):
+    assert asset_path(f"{scene.name}.xml").read_text() == scene_xml(scene)
+
+
+def test_a_heavier_object_is_caught_in_the_committed_scene():
+    heavier = replace(BOX, object=replace(BOX.object, mass=BOX.object.mass * 1.001))
+    assert asset_path("box-tilt.xml").read_text() != scene_xml(heavier)
+
+
+@each_scenario
+def test_committed_scene_opens_as_a_file_with_the_tips_touching_at_its_start(scene):
+    model = mujoco.MjModel.from_xml_path(str(asset_path(f"{scene.name}.xml")))
+    data = mujoco.MjData(model)
+    mujoco.mj_resetDataKeyframe(model, data, model.key("start").id)
+    mujoco.mj_forward(model, data)
+    assert np.abs(tip_distances(scene, model, data)).max() < TOUCHING
+    # A milliradian in every joint is caught.
+    data.qpos[model.jnt_qposadr[model.actuator_trnid[:, 0]]] += 1e-3
+    mujoco.mj_forward(model, data)
+    assert np.abs(tip_distances(scene, model, data)).max() > 10.0 * TOUCHING
+
+
+@each_scenario
+def test_committed_scene_is_the_composed_one_to_its_printed_digits(scene):
+    model = mujoco.MjModel.from_xml_path(str(asset_path(f"{scene.name}.xml")))
+    expected = composed(scene.name)
+    for field in (
+        "body_mass",
+        "body_pos",
+        "geom_size",
+        "pair_friction",
+        "pair_solref",
+        "dof_damping",
+    ):
+        # Six digits are printed.
+        np.testing.assert_allclose(
+            getattr(model, field), getattr(expected, field), rtol=5e-6, atol=1e-12, err_msg=field
+        )
+    for field in ("timestep", "impratio", "noslip_iterations", "cone", "integrator", "tolerance"):
+        assert getattr(model.opt, field) == getattr(expected.opt, field), field
+
+
+# --- object, contacts, environment ---
+
+
+@each_scenario
+def test_object_has_the_scenario_s_mass_inertia_and_start(scene):
+    model = composed(scene.name)
+    body, thing = model.body(scene.object.name), scene.object
+    assert body.mass[0] == thing.mass
+    np.testing.assert_array_equal(body.ipos, thing.center_of_mass)
+    # The full inertia about the body's axes, however MuJoCo orders its principal axes.
+    axes = Rotation.from_quat(body.iquat, scalar_first=True).as_matrix()
+    inertia = axes @ np.diag(body.inertia) @ axes.T
+    largest = max(thing.inertia)
+    # Rounding.
+    np.testing.assert_allclose(inertia, np.diag(thing.inertia), rtol=0, atol=1e-14 * largest)
+    np.testing.assert_array_equal(body.pos, scene.path.start.position)
+    # MuJoCo normalises quaternions.
+    np.testing.assert_allclose(body.quat, scene.path.start.quaternion, rtol=0, atol=1e-15)
+    assert [g for g in names(model, "geom", model.ngeom) if model.geom(g).bodyid == body.id] == [
+        geom.name for geom in thing.geoms
+    ]
+
+
+def pair_frictions(model):
+    """condim and friction of each explicit pair, by the names of its two geoms."""
+    return {
+        frozenset(model.geom(int(g)).name for g in (pair.geom1[0], pair.geom2[0])): (
+            int(pair.dim[0]),
+            pair.friction[:3].tolist(),
+        )
+        for pair in (model.pair(i) for i in range(model.npair))
+    }
+
+
+def expected_frictions(scene):
+    """Soft fingers carry torsion up to mu e_n f_n; points with friction carry none."""
+    touching = [(tip_geom(hand), hand.geom, hand.friction) for hand in scene.hands]
+    touching += [(s.surface, s.geom, s.friction) for s in scene.supports]
+    return {
+        frozenset((first, second)): (
+            (3, [f.mu, f.mu, 0.0]) if f.e_n is None else (4, [f.mu, f.mu, f.mu * f.e_n])
+        )
+        for first, second, f in touching
+    }
+
+
+@each_scenario
+def test_contact_pairs_have_the_scenario_s_friction_and_nothing_else_collides(scene):
+    model = composed(scene.name)
+    assert pair_frictions(model) == expected_frictions(scene)
+    assert not model.geom_contype.any()
+    assert not model.geom_conaffinity.any()
+
+
+@pytest.mark.parametrize("friction", [Friction(0.1, 0.4), Friction(0.11, 0.5), Friction(0.1)])
+def test_another_friction_is_caught_in_the_contact_pairs(friction):
+    left, right = BOX.hands
+    other = replace(BOX, hands=(replace(left, friction=friction), right))
+    assert pair_frictions(compose(other).compile()) != expected_frictions(BOX)
+    assert pair_frictions(compose(other).compile()) == expected_frictions(other)
+
+
+@each_scenario
+def test_physics_settings_reach_the_model(scene):
+    physics = replace(
+        scene.physics, timestep=0.0007, impratio=33.0, noslip_iterations=3, solref=(0.02, 0.9)
+    )
+    for settings in (scene.physics, physics):
+        model = compose(replace(scene, physics=settings)).compile()
+        option = model.opt
+        assert (option.timestep, option.impratio) == (settings.timestep, settings.impratio)
+        assert option.noslip_iterations == settings.noslip_iterations
+        assert option.cone == mujoco.mjtCone.mjCONE_ELLIPTIC
+        assert option.integrator == mujoco.mjtIntegrator.mjINT_IMPLICITFAST
+        np.testing.assert_array_equal(option.gravity, [0.0, 0.0, -9.81])
+        assert (model.pair_solref == settings.solref).all()
+        assert (model.pair_solreffriction == settings.solref_friction).all()
+        assert (model.pair_solimp[:, :3] == settings.solimp).all()
+
+
+def test_environment_stands_where_the_scenario_puts_it():
+    pose = Pose((0.1, 0.2, 0.3), (0.8, 0.6, 0.0, 0.0))
+    peg = Geom("peg", "capsule", (0.02, 0.1), pose)
+    model = compose(replace(BOX, environment=(*BOX.environment, peg))).compile()
+    geom = model.geom("peg")
+    assert geom.bodyid == 0
+    assert geom.type == mujoco.mjtGeom.mjGEOM_CAPSULE
+    np.testing.assert_array_equal(geom.size, [0.02, 0.1, 0.0])
+    np.testing.assert_array_equal(geom.pos, pose.position)
+    # MuJoCo normalises quaternions.
+    np.testing.assert_allclose(geom.quat, pose.quaternion, rtol=0, atol=1e-15)
+
+
+# --- robot and hands ---
+
+
+@each_scenario
+def test_only_driven_joints_move_and_each_has_its_motor(scene):
+    model = composed(scene.name)
+    joints = names(model, "joint", model.njnt)
+    driven = set(scene.robot.posture)
+    assert set(joints) == driven | {scene.object.name}
+    motors = [model.joint(int(j)).name for j in model.actuator_trnid[:, 0]]
+    assert sorted(motors) == sorted(driven)
+    official = mujoco.MjModel.from_xml_path(str(asset_path(scene.robot.model)))
+    motor_of = {official.joint(int(j)).name: i for i, j in enumerate(official.actuator_trnid[:, 0])}
+    for i, name in enumerate(motors):
+        limits = official.actuator(motor_of[name]).ctrlrange
+        np.testing.assert_array_equal(model.actuator(i).ctrlrange, limits)
+        np.testing.assert_array_equal(model.joint(name).range, official.joint(name).range)
+        assert model.joint(name).damping == official.joint(name).damping
+
+
+def robot_bodies(model, robot):
+    """Mass and, with all joints at 0, position of each of the robot's bodies [kg, m]."""
+    data = mujoco.MjData(model)
+    data.qpos[: robot.nq] = 0.0
+    mujoco.mj_kinematics(model, data)
+    bodies = names(robot, "body", robot.nbody)[1:]
+    return np.array([[*model.body(b).mass, *data.body(b).xpos] for b in bodies])
+
+
+@each_scenario
+def test_locking_joints_leaves_masses_and_places_at_angle_zero(scene):
+    spec = mujoco.MjSpec.from_file(str(asset_path(scene.robot.model)))
+    robot = spec.compile()
+    at_origin = replace(scene, robot=replace(scene.robot, base=Pose()))
+    model = compose(at_origin, ObjectMotion.POSED).compile()
+    expected = robot_bodies(robot, robot)
+    # The same numbers added up in the same order.
+    np.testing.assert_allclose(robot_bodies(model, robot), expected, rtol=0, atol=1e-14)
+    # A gram more in one body is caught.
+    spec.bodies[-1].mass += 1e-3
+    assert np.abs(robot_bodies(spec.compile(), robot) - expected).max() > 0.9e-3
+
+
+def test_hands_sit_on_their_mounts_and_turn_with_them():
+    model = composed("box-tilt")
+    for hand in BOX.hands:
+        body = model.body(hand_body(hand))
+        assert model.body(body.parentid[0]).name == hand.mount
+        np.testing.assert_array_equal(body.pos, 0.0)
+        np.testing.assert_array_equal(body.quat, [1.0, 0.0, 0.0, 0.0])
+        assert model.geom(tip_geom(hand)).bodyid == body.id
+        assert model.site(tip_site(hand)).bodyid == body.id
+
+
+def test_base_pose_carries_the_whole_robot_and_nothing_else():
+    base = Pose((0.1, -0.2, 0.3), (np.cos(0.2), 0.0, np.sin(0.2), 0.0))
+    moved = compose(replace(BOX, robot=replace(BOX.robot, base=base))).compile()
+    model = composed("box-tilt")
+    turn = Rotation.from_quat(base.quaternion, scalar_first=True).as_matrix()
+    here, there = mujoco.MjData(model), mujoco.MjData(moved)
+    mujoco.mj_kinematics(model, here)
+    mujoco.mj_kinematics(moved, there)
+    for i in range(1, model.nbody):
+        expected = here.xpos[i]
+        if model.body(i).name != "box":
+            expected = turn @ expected + base.position
+        # A chain of ten frames at 1 m.
+        np.testing.assert_allclose(there.xpos[i], expected, rtol=0, atol=1e-14)
+
+
+def test_a_posed_object_has_no_joint_and_no_contacts():
+    model = compose(BOX, ObjectMotion.POSED).compile()
+    assert model.body("box").mocapid[0] == 0
+    assert model.njnt == len(BOX.robot.posture)
+    assert model.npair == 0
+
+
+# --- what is refused ---
+
+
+def with_hand(**changes):
+    return replace(BOX, hands=(replace(BOX.hands[0], **changes), BOX.hands[1]))
+
+
+def with_support(**changes):
+    return replace(BOX, supports=(replace(BOX.supports[0], **changes), BOX.supports[1]))
+
+
+def assert_refused(make, field, given, valid):
+    with pytest.raises(InvalidInputError) as error:
+        compose(make())
+    assert error.value.field == field
+    message = str(error.value)
+    assert message.startswith(f"{field}: got {given}; valid is ")
+    assert valid in message.partition("valid is")[2]
+
+
+def test_the_scenario_itself_is_composed():
+    assert compose(with_hand()).compile().nu == len(BOX.robot.posture)
+
+
+def test_a_joint_that_the_robot_lacks_is_refused_by_name():
+    robot = replace(BOX.robot, posture={**BOX.robot.posture, "left_s9": 0.1})
+    assert_refused(lambda: replace(BOX, robot=robot), "robot.posture", "left_s9", "left_s0")
+
+
+def test_a_mount_that_the_robot_lacks_is_refused_by_name():
+    assert_refused(
+        lambda: with_hand(mount="left_foot"), "left.mount", "left_foot", "left_hand_link"
+    )
+
+
+def test_a_geom_kind_that_mujoco_lacks_is_refused_by_name():
+    pyramid = Geom("pyramid", "pyramid", (0.1, 0.1))
+    environment = (*BOX.environment, pyramid)
+    assert_refused(
+        lambda: replace(BOX, environment=environment), "pyramid.kind", "pyramid", "sphere, capsule"
+    )
+
+
+def test_a_contact_on_a_geom_that_the_object_lacks_is_refused_by_name():
+    assert_refused(lambda: with_hand(geom="lid"), "left.geom", "lid", "one of box")
+    assert_refused(lambda: with_support(geom="lid"), "edge_left.geom", "lid", "one of box")
+
+
+def test_a_support_on_a_surface_that_is_not_there_is_refused_by_name():
+    assert_refused(lambda: with_support(surface="floor"), "edge_left.surface", "floor", "table")
+
+
+def test_two_frictions_between_the_same_geoms_are_refused():
+    # One pair of geoms has one friction in MuJoCo; the second to ask is named.
+    assert_refused(
+        lambda: with_support(friction=Friction(mu=0.2)),
+        "edge_right.friction",
+        "Friction(mu=0.25, e_n=None)",
+        "Friction(mu=0.2, e_n=None), as at other contacts of box on table",
+    )
+
+
+def test_a_hand_model_that_is_not_shipped_is_refused_by_name():
+    with pytest.raises(FileNotFoundError, match=r"'claw.xml'.*palm_pad.xml"):
+        compose(with_hand(model="claw.xml"))
