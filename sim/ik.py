@@ -32,13 +32,13 @@ _DAMPING = 1e-8
 # Longest step of a joint while the start is sought [rad or m]: longer ones leave the region where
 # the task is linear, and an arm that is out of reach ends far from it, at limits of no concern.
 _START_STEP = 0.05
-# The same for joints that are to keep still: large against it, so that the others move instead.
-_STILL_DAMPING = 1e-2
 # Clearance that links keep from each other and from the scene, and from where they look out [m].
 _CLEARANCE, _DETECTION = 0.005, 0.05
 # How near to a limit counts as being at it [rad, m, or share of the speed limit].
 _AT_LIMIT = 1e-3
 _NAMED_COLLISIONS = 3
+# Damping of joints that are to keep still: large against the others', so that those move instead.
+_STILL_DAMPING = 1e-2
 
 
 class PathError(FulcrumError):

@@ -133,7 +133,8 @@ def test_a_file_that_a_command_leaves_would_be_noticed(place):
 
 def test_an_unknown_name_is_answered_with_all_valid_ones(capsys):
     main(["run", "sofa-tilt"])
-    assert all(name in capsys.readouterr().err for name in scenarios())
+    answer = capsys.readouterr().err
+    assert all(name in answer for name in scenarios())
 
 
 WORDS = st.text(st.characters(codec="utf-8", exclude_characters="\0"), max_size=8)

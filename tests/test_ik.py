@@ -205,13 +205,17 @@ def joints_between(first, second):
 
 def watched_pairs(scene, model, start):
     """Geoms that should keep clear of each other, from the tree of joints alone."""
-    around = {g.name for g in (*scene.object.geoms, *scene.environment)}
+    geoms = (*scene.object.geoms, *scene.environment)
+    around = {g.name for g in geoms}
+    open_to_arms = {g.name for g in geoms if not g.solid}
     touching = {frozenset((tip_geom(hand), hand.geom)) for hand in scene.hands}
     chains = [chain_of(model, g) for g in range(model.ngeom)]
     pairs = []
     for a, b in itertools.combinations(range(model.ngeom), 2):
         pair = {model.geom(a).name, model.geom(b).name}
         if not (chains[a] or chains[b]) or pair in touching or pair <= around:
+            continue
+        if pair & open_to_arms:
             continue
         if not pair & around:
             near = joints_between(chains[a], chains[b]) <= 3

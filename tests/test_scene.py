@@ -219,8 +219,8 @@ def test_locking_joints_leaves_masses_and_places_at_angle_zero(scene):
     expected = robot_bodies(robot, robot)
     # The same numbers added up in the same order.
     np.testing.assert_allclose(robot_bodies(model, robot), expected, rtol=0, atol=1e-14)
-    # A gram more in one body is caught.
-    spec.bodies[-1].mass += 1e-3
+    # A body a millimetre off is caught.
+    spec.bodies[-1].pos[0] += 1e-3
     assert np.abs(robot_bodies(spec.compile(), robot) - expected).max() > 0.9e-3
 
 
