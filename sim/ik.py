@@ -148,22 +148,32 @@ class _Follower:
         )
 
     def follow(self) -> JointPath:
-        self._reach(_Target(0.0, self._scenario.standoff), None)
-        progress, q = [], []
-        for index in range(len(self._schedule.phases)):
-            grid, targets = self._targets(index)
-            postures = [self._configuration.q.copy()]
-            for target, duration in zip(
-                targets[1:], np.diff(self._schedule.times(index, grid)), strict=True
-            ):
-                self._reach(target, float(duration))
-                postures.append(self._configuration.q.copy())
-            progress.append(grid)
-            q.append(np.array(postures)[:, self._motor_dofs])
+        phases = self._schedule.phases
+        touched = next((i for i, p in enumerate(phases) if p.gap == 0.0), len(phases) - 1)
+        # The approach is planned backwards, so that the arms hold from the posture that was sought.
+        self._reach(_Target(phases[touched].tilt * self._path.end, phases[touched].gap), None)
+        holding = self._configuration.q.copy()
+        planned = [self._follow(i, backwards=True) for i in range(touched, -1, -1)][::-1]
+        self._configuration.update(holding)
+        planned += [self._follow(i) for i in range(touched + 1, len(phases))]
+        progress, q = zip(*planned, strict=True)
         low, high = self._model.jnt_range[self._motor_dofs].T
         every = np.concatenate(q)
         clearance = np.minimum(every - low, high - every).min(axis=0)
         return JointPath(self._schedule, tuple(progress), tuple(q), clearance)
+
+    def _follow(self, index: int, backwards: bool = False) -> tuple[Array, Array]:
+        """Grid of a phase's progress, and the motors' angles there; starts where the arms are."""
+        grid, targets = self._targets(index)
+        durations = np.diff(self._schedule.times(index, grid))
+        if backwards:
+            targets, durations = targets[::-1], durations[::-1]
+        postures = [self._configuration.q.copy()]
+        for target, duration in zip(targets[1:], durations, strict=True):
+            self._reach(target, float(duration))
+            postures.append(self._configuration.q.copy())
+        q = np.array(postures)[:, self._motor_dofs]
+        return grid, q[::-1] if backwards else q
 
     def _targets(self, index: int) -> tuple[Array, list[_Target]]:
         """Grid of a phase's progress, fine enough for its motion, and what to reach there."""

@@ -18,7 +18,7 @@ SYNTHESIZER = Synthesizer()
 AGREEMENT = 1e-4
 # Slopes that change the objective by less than this share of it per 100 % are compared on that
 # scale: the solver's noise over the step.
-FLOOR = 1e-2
+FLOOR = 5e-2
 # Centre of mass [m].
 CENTER_STEP = 1e-5
 
