@@ -223,5 +223,5 @@ def test_a_ball_joint_is_refused_by_name():
     )
     for kind in ("hinge", "slide"):
         pinocchio_model(mujoco.MjModel.from_xml_string(mjcf.format(kind)))
-    with pytest.raises(InvalidInputError, match="^joint ball: got a ball joint; valid is a hinge"):
+    with pytest.raises(InvalidInputError, match=r"^joint ball: got a ball joint; valid is a hinge"):
         pinocchio_model(mujoco.MjModel.from_xml_string(mjcf.format("ball")))

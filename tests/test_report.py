@@ -35,8 +35,8 @@ TOUCH_ROW, GRIP_ROW, ROW, LAST = 100, 400, 1700, 2699
 INFO = RunInfo(controller="margin", objective="max-normal-force", seed=3, wall_s=2.0)
 
 REPORT_KEYS = {
-    "": "scenario controller objective seed verdict failures phases tilt contacts torque synthesis timing"
-    " recording",
+    "": "scenario controller objective seed verdict failures phases tilt contacts torque synthesis"
+    " timing recording",
     "tilt": "target_deg final_deg rms_error_deg max_error_deg",
     "contacts": "left right edge_left edge_right",
     "contacts.left": "kept_fraction slip_mm slide_mm spin_deg max_utilisation max_normal_n"
