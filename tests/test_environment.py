@@ -16,6 +16,9 @@ from sim.environment import make_environment
 from sim.loop import ClosedLoop
 from sim.path import ScrewPath
 from sim.robot import RobotModel
+from sim.schedule import Schedule
+from sim.settings import Phase
+from synthesis import InvalidInputError
 
 BOX = scenario("box-tilt")
 LOOP_STEPS = 300
@@ -34,7 +37,7 @@ class Conformance(EnvironmentTestMixin):
 
     def make_action_sequence(self):
         """Limp arms, past the end of the episode."""
-        steps = int(np.ceil(self.scene.timing.total_s / 0.5)) + 2
+        steps = int(np.ceil(Schedule(self.scene).total_s / 0.5)) + 2
         return itertools.repeat(np.zeros(self.environment.action_spec().shape), steps)
 
 
@@ -66,7 +69,7 @@ def test_an_episode_ends_with_the_schedule(name):
     environment = make_environment(scene, control_timestep=0.5)
     action = np.zeros(environment.action_spec().shape)
     environment.reset()
-    steps = [environment.step(action) for _ in range(round(scene.timing.total_s / 0.5))]
+    steps = [environment.step(action) for _ in range(int(np.ceil(Schedule(scene).total_s / 0.5)))]
     assert [s.step_type for s in steps[:-1]] == [StepType.MID] * (len(steps) - 1)
     assert steps[-1].step_type is StepType.LAST
     # No fall ends an episode early, and its end is the schedule's, not a terminal state.
@@ -121,6 +124,12 @@ def test_the_default_action_lasts_as_long_as_a_synthesis(name):
     assert make_environment(scene).control_timestep() == pytest.approx(expected, rel=1e-12)
     coarse = make_environment(scene, control_timestep=0.02)
     assert coarse.control_timestep() == pytest.approx(0.02, rel=1e-12)
+
+
+@pytest.mark.parametrize("value", [0.0, -0.01, np.nan, np.inf])
+def test_a_senseless_time_between_actions_is_refused_by_name(value):
+    with pytest.raises(InvalidInputError, match=rf"^control_timestep: got {value}; valid is"):
+        make_environment(BOX, control_timestep=value)
 
 
 def reward_at(environment, scene, tilt):
@@ -186,10 +195,20 @@ def test_without_deviation_every_seed_starts_alike():
 # --- the same plant as the closed loop's ---
 
 
+def soon(scene):
+    """The scenario with hands that start near and grip at once."""
+    phases = (
+        Phase("touch", 0.1, tilt=0.0, gap=0.0, grip=0.0),
+        Phase("grip", 0.2, tilt=0.0, gap=0.0, grip=1.0),
+        Phase("hold", 0.1, tilt=0.0, gap=0.0, grip=1.0),
+    )
+    return replace(scene, standoff=0.002, phases=phases)
+
+
 @cache
 def closed_loop(name):
     """The first rows of a closed loop with seed 5."""
-    scene = scenario(name)
+    scene = soon(scenario(name))
     loop = ClosedLoop(scene, scene.control, seed=5)
     for _ in loop.run():
         if loop.steps >= LOOP_STEPS:
@@ -199,7 +218,7 @@ def closed_loop(name):
 
 def replay(name, torques):
     """Joint angles, object poses and contact forces when torques are applied step by step."""
-    scene = scenario(name)
+    scene = soon(scenario(name))
     environment = make_environment(scene, 5, control_timestep=scene.physics.timestep)
     observation = environment.reset().observation
     q, poses, forces = [], [], []
@@ -235,7 +254,7 @@ def test_a_replay_with_a_slightly_other_torque_is_caught(name):
 @each_scenario
 def test_twist_is_that_before_the_last_physics_step_and_the_pose_that_after(name):
     trace, dt = closed_loop(name), scenario(name).physics.timestep
-    environment = make_environment(scenario(name), 5, control_timestep=dt)
+    environment = make_environment(soon(scenario(name)), 5, control_timestep=dt)
     environment.reset()
     for row, tau in enumerate(trace.tau[:100]):
         observation = environment.step(tau).observation

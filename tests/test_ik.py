@@ -1,22 +1,18 @@
-"""The planned path keeps the tips on the object and all limits, or says which one stops it."""
+"""The planned path keeps the tips where the phases ask for, and all limits."""
 
-import itertools
 from dataclasses import replace
-from functools import cache
 
 import mujoco
 import numpy as np
 import pytest
-from scipy.spatial.transform import Rotation
 
-from assets import asset_path, velocity_limits
 from scenarios import scenario, scenarios
-from sim.ik import JointPath, PathError, plan_joints
-from sim.path import Schedule, ScrewPath
-from sim.scenario import Geom, Pose
-from sim.scene import ObjectMotion, compose, tip_geom, tip_site
+from sim.ik import plan_joints
+from sim.path import ScrewPath
+from sim.scene import tip_geom, tip_site
+from synthesis import InvalidInputError
+from tests.postures import asked, between, on_grid, planned, posed, posed_model, tampered
 
-BOX = scenario("box-tilt")
 # Inverse kinematics stops at a pose error of 1e-9; orientation counts at the lever of the tip.
 ON_GRID = 1e-8
 # A cubic spline through steps of h = 1 deg leaves h^4 / 384 times a fourth derivative of ~100 rad
@@ -26,325 +22,197 @@ BETWEEN = 1e-6
 each_scenario = pytest.mark.parametrize("name", scenarios())
 
 
-def schedule_of(scene):
-    return Schedule(scene.timing, ScrewPath(scene.path).end)
-
-
-def plan(scene):
-    return plan_joints(scene, ScrewPath(scene.path), schedule_of(scene))
-
-
-@cache
-def planned(name):
-    return plan(scenario(name))
-
-
-@cache
-def posed_model(name):
-    return compose(scenario(name), ObjectMotion.POSED).compile()
-
-
-def posed(scene, model, q, tilt):
-    """MuJoCo's data with the robot at angles q, (l,), and the object at a tilt [rad]."""
-    data = mujoco.MjData(model)
-    data.qpos[model.jnt_qposadr[model.actuator_trnid[:, 0]]] = q
-    R_WO, p_WO = ScrewPath(scene.path).pose(tilt)
-    mocap = model.body(scene.object.name).mocapid[0]
-    data.mocap_pos[mocap] = p_WO
-    data.mocap_quat[mocap] = Rotation.from_matrix(R_WO).as_quat(scalar_first=True)
-    mujoco.mj_kinematics(model, data)
-    return data
-
-
-def tip_errors(name, path, tilts):
-    """Largest error of the tips' centres [m] and of their axes [-] at tilts [rad]."""
+def tip_errors(name, path, where):
+    """Largest error of the tips' centres [m] and of their axes [-] at phases and progresses."""
     scene, model = scenario(name), posed_model(name)
     positions, axes = [], []
-    for tilt in tilts:
-        data = posed(scene, model, path(tilt)[0], tilt)
+    for index, progress in where:
+        tilt, gap = asked(path.schedule, index, progress)
+        data = posed(scene, model, path.at(index, progress)[0], tilt)
         thing = data.body(scene.object.name)
         R_WO = thing.xmat.reshape(3, 3)
         for hand in scene.hands:
             normal, tangent = R_WO @ hand.normal_O, R_WO @ hand.tangent_O
             radius = model.geom(tip_geom(hand)).size[0]
             tip = data.site(tip_site(hand))
-            expected = thing.xpos + R_WO @ hand.p_OC_O - radius * normal
+            expected = thing.xpos + R_WO @ hand.p_OC_O - (radius + gap) * normal
             positions.append(tip.xpos - expected)
             tip_axes = tip.xmat.reshape(3, 3)
             axes.append(tip_axes - np.column_stack([tangent, np.cross(normal, tangent), normal]))
     return float(np.abs(positions).max()), float(np.abs(axes).max())
 
 
-def between(path):
-    """Tilts between the grid's, ten in every step."""
-    fractions = (np.arange(10) + 0.5) / 10
-    return (path.tilts[:-1, None] + np.diff(path.tilts)[:, None] * fractions).ravel()
+def coarse(path, phase, stride):
+    """The path through every so many points of one phase's grid."""
 
+    def thinned(arrays):
+        return tuple(a[::stride] if i == phase else a for i, a in enumerate(arrays))
 
-def tampered(path, change):
-    """The path with every joint a little off [rad or m]."""
-    return replace(path, q=path.q + change)
+    return replace(path, progress=thinned(path.progress), q=thinned(path.q))
 
 
 # --- the path is followed ---
 
 
 @each_scenario
-def test_tips_touch_the_object_at_every_grid_tilt(name):
+def test_tips_are_where_the_phases_ask_for_at_every_point_of_the_grids(name):
     path = planned(name)
-    position, axis = tip_errors(name, path, path.tilts)
+    position, axis = tip_errors(name, path, on_grid(path))
     assert position < ON_GRID
     assert axis < ON_GRID
     # A ten-millionth of a radian is caught.
-    position, axis = tip_errors(name, tampered(path, 1e-7), path.tilts)
+    position, axis = tip_errors(name, tampered(path, 1e-7), on_grid(path))
     assert position > ON_GRID
     assert axis > ON_GRID
 
 
 @each_scenario
-def test_tips_touch_the_object_between_grid_tilts(name):
+def test_tips_are_where_the_phases_ask_for_between_the_points_of_the_grids(name):
     path = planned(name)
     position, axis = tip_errors(name, path, between(path))
     assert position < BETWEEN
     assert axis < BETWEEN
-    # A path with a fifth of the grid is caught.
-    coarse = JointPath(path.tilts[::5], path.q[::5], path.clearance)
-    assert tip_errors(name, coarse, between(path)[:200])[0] > BETWEEN
+    # The tilt with a fifth of its grid is caught.
+    tilting = int(np.argmax([len(x) for x in path.progress]))
+    where = [(i, x) for i, x in between(path) if i == tilting][:200]
+    assert tip_errors(name, path, where)[0] < BETWEEN
+    assert tip_errors(name, coarse(path, tilting, 5), where)[0] > BETWEEN
 
 
 @each_scenario
-def test_grid_spans_the_path_in_steps_of_a_degree_at_most(name):
-    path, end = planned(name), np.radians(scenario(name).path.angle_deg)
-    assert path.tilts[0] == 0.0
-    assert path.tilts[-1] == pytest.approx(end, abs=1e-15)
-    assert np.degrees(np.diff(path.tilts)).max() < 1.0 + 1e-9
+def test_grids_span_their_phases_in_steps_of_a_degree_and_5_mm_at_most(name):
+    path = planned(name)
+    assert len(path.progress) == len(path.q) == len(scenario(name).phases)
+    for index, grid in enumerate(path.progress):
+        assert (grid[0], grid[-1]) == (0.0, 1.0)
+        tilts, gaps = np.array([asked(path.schedule, index, x) for x in grid]).T
+        assert np.degrees(np.abs(np.diff(tilts))).max() < 1.0 + 1e-9
+        assert np.abs(np.diff(gaps)).max() < 0.005 + 1e-9
 
 
 @each_scenario
-def test_slope_is_the_derivative_by_the_tilt(name):
+def test_slope_is_the_derivative_by_the_progress(name):
     path, h = planned(name), 1e-5
-    tilts = between(path)
-    slope = (path(tilts + h)[0] - path(tilts - h)[0]) / (2.0 * h)
-    # Rounding over 2 h is 1e-11, a third derivative of 100 times h^2 / 6 is 2e-9.
-    np.testing.assert_allclose(path(tilts)[1], slope, rtol=0, atol=1e-8)
-    assert np.abs(path(tilts + 1e-4)[1] - slope).max() > 1e-6
+    where = [(i, x) for i, x in between(path) if h < x < 1.0 - h]
+    ends = [np.array([path.at(i, x + d)[0] for i, x in where]) for d in (-h, h)]
+    difference = (ends[1] - ends[0]) / (2.0 * h)
+    slope = np.array([path.at(i, x)[1] for i, x in where])
+    # Rounding over 2 h is 1e-11; a third derivative by the progress, of some 100 rad, times h^2 / 6
+    # is 2e-9, and its jumps between the spline's pieces are as large.
+    np.testing.assert_allclose(slope, difference, rtol=0, atol=1e-8)
+    late = np.array([path.at(i, x + 1e-4)[1] for i, x in where])
+    assert np.abs(late - difference).max() > 1e-6
 
 
 @each_scenario
 def test_planning_twice_gives_the_same_path_bit_for_bit(name):
-    np.testing.assert_array_equal(plan(scenario(name)).q, planned(name).q)
+    again = plan_joints(scenario(name))
+    for q, expected in zip(again.q, planned(name).q, strict=True):
+        np.testing.assert_array_equal(q, expected)
 
 
-# --- limits are kept ---
+# --- from phase to phase ---
 
 
-@each_scenario
-def test_joint_limits_are_kept_with_the_clearance_that_the_path_states(name):
-    path, model = planned(name), posed_model(name)
-    low, high = model.jnt_range[model.actuator_trnid[:, 0]].T
-    clearance = np.minimum(path.q - low, high - path.q).min(axis=0)
-    # The same subtraction.
-    np.testing.assert_array_equal(path.clearance, clearance)
-    assert (clearance > 0.0).all()
-    q = path(between(path))[0]
-    assert ((low < q) & (q < high)).all()
-    # Any joint that is moved by its clearance and a bit is caught.
-    beyond = tampered(path, np.where(path.q[0] > path.q[-1], 1, -1) * 10.0)
-    assert (np.minimum(beyond.q - low, high - beyond.q).min(axis=0) < 0.0).all()
-
-
-def test_box_path_stays_half_a_radian_from_every_joint_limit():
-    assert planned("box-tilt").clearance.min() > 0.5
-
-
-def fastest(scene, path, tilt_s):
-    """Largest joint speed over its limit when the tilt takes a time [s]."""
-    timing = replace(scene.timing, tilt_s=tilt_s)
-    schedule = Schedule(timing, ScrewPath(scene.path).end)
-    tilt, rate = schedule.tilt(np.linspace(0.0, timing.total_s, 5000))
-    model = posed_model(scene.name)
-    limits = velocity_limits(model)
-    joints = [model.joint(int(j)).name for j in model.actuator_trnid[:, 0]]
-    return np.max(np.abs(path(tilt)[1] * rate[:, None]) / [limits[j] for j in joints])
+def jumps(path):
+    """Largest difference of postures over the phases' borders [rad or m]."""
+    count = len(path.progress)
+    return max(np.abs(path.at(i + 1, 0.0)[0] - path.at(i, 1.0)[0]).max() for i in range(count - 1))
 
 
 @each_scenario
-def test_speed_limits_are_kept_over_the_schedule(name):
-    scene, path = scenario(name), planned(name)
-    utilisation = fastest(scene, path, scene.timing.tilt_s)
-    assert utilisation < 1.0
-    # So much faster, and the same check fails.
-    assert fastest(scene, path, scene.timing.tilt_s * utilisation / 1.01) > 1.0
-
-
-@each_scenario
-def test_the_fastest_allowed_tilt_is_planned_and_a_faster_one_is_not(name):
-    scene, path = scenario(name), planned(name)
-    shortest = scene.timing.tilt_s * fastest(scene, path, scene.timing.tilt_s)
-    # The path may bend within its redundancy, but a tenth of time is more than that gives.
-    plan(replace(scene, timing=replace(scene.timing, tilt_s=1.1 * shortest)))
-    with pytest.raises(PathError, match="speed limit"):
-        plan(replace(scene, timing=replace(scene.timing, tilt_s=0.7 * shortest)))
-
-
-def chain_of(model, geom):
-    """The joints that carry a geom, from the base."""
-    body, chain = model.geom_bodyid[geom], []
-    while body:
-        first, count = model.body_jntadr[body], model.body_jntnum[body]
-        chain = [*range(first, first + count), *chain]
-        body = model.body_parentid[body]
-    return chain
-
-
-def joints_between(first, second):
-    """Number of joints between two chains' ends, along the tree; infinite across branches."""
-    longer, shorter = sorted((first, second), key=len, reverse=True)
-    return len(longer) - len(shorter) if longer[: len(shorter)] == shorter else np.inf
-
-
-def watched_pairs(scene, model, start):
-    """Geoms that should keep clear of each other, from the tree of joints alone."""
-    geoms = (*scene.object.geoms, *scene.environment)
-    around = {g.name for g in geoms}
-    open_to_arms = {g.name for g in geoms if not g.solid}
-    touching = {frozenset((tip_geom(hand), hand.geom)) for hand in scene.hands}
-    chains = [chain_of(model, g) for g in range(model.ngeom)]
-    pairs = []
-    for a, b in itertools.combinations(range(model.ngeom), 2):
-        pair = {model.geom(a).name, model.geom(b).name}
-        if not (chains[a] or chains[b]) or pair in touching or pair <= around:
-            continue
-        if pair & open_to_arms:
-            continue
-        if not pair & around:
-            near = joints_between(chains[a], chains[b]) <= 3
-            if near or mujoco.mj_geomDistance(model, start, a, b, 0.05, None) <= 0.0:
-                continue
-        pairs.append((a, b))
-    return pairs
-
-
-def nearest(scene, model, path, tilts):
-    """Smallest distance of watched geoms over tilts, up to 50 mm [m], and between which."""
-    posture = [scene.robot.posture[model.joint(int(j)).name] for j in model.actuator_trnid[:, 0]]
-    pairs = watched_pairs(scene, model, posed(scene, model, posture, 0.0))
-    assert len(pairs) > 100
-    best = np.inf, ""
-    for tilt in tilts:
-        data = posed(scene, model, path(tilt)[0], tilt)
-        for a, b in pairs:
-            distance = mujoco.mj_geomDistance(model, data, a, b, 0.05, None)
-            best = min(best, (distance, f"{model.geom(a).name} {model.geom(b).name}"))
-    return best
-
-
-@each_scenario
-def test_links_keep_clear_of_each_other_and_of_the_scene(name):
+def test_postures_are_continuous_over_the_phases_borders(name):
     path = planned(name)
-    # Half of the grid; the arms move by less than 2 cm in a step. The limit is 5 mm, of which
-    # linearisation within a step may cost a little.
-    distance, which = nearest(scenario(name), posed_model(name), path, path.tilts[::2])
-    assert distance > 4.9e-3, which
+    # The same numbers, through splines that interpolate: a few roundings.
+    assert jumps(path) < 1e-14
+    first = tuple(q + 1e-9 * (i == 1) for i, q in enumerate(path.q))
+    assert jumps(replace(path, q=first)) > 0.9e-9
 
 
-def test_a_post_in_the_way_of_the_planned_arm_is_caught_by_its_distance():
-    path = planned("box-tilt")
-    scene = replace(BOX, environment=(*BOX.environment, POST))
-    model = compose(scene, ObjectMotion.POSED).compile()
-    distance, which = nearest(scene, model, path, path.tilts[10:40:10])
-    assert distance < 0.0
-    assert "post" in which
+@each_scenario
+def test_arms_rest_in_phases_that_ask_for_no_motion(name):
+    path = planned(name)
+    resting = 0
+    for index, phase in enumerate(scenario(name).phases):
+        previous = path.schedule.before(index)
+        if (previous.tilt, previous.gap) == (phase.tilt, phase.gap):
+            resting += 1
+            assert np.ptp(path.q[index], axis=0).max() < 1e-9
+        else:
+            assert np.ptp(path.q[index], axis=0).max() > 1e-3
+    assert resting
 
 
-# --- what stops the arms is named ---
-
-POST = Geom("post", "sphere", (0.05,), Pose((0.6, 0.35, 0.1)))
-
-
-def moved(scene, dx):
-    """The scenario with object, path and environment further from the robot [m]."""
-
-    def shifted(pose):
-        return replace(pose, position=(pose.position[0] + dx, *pose.position[1:]))
-
-    x, *yz = scene.path.point_W
-    return replace(
-        scene,
-        environment=tuple(replace(g, pose=shifted(g.pose)) for g in scene.environment),
-        path=replace(scene.path, start=shifted(scene.path.start), point_W=(x + dx, *yz)),
+def distances(name, index, progress):
+    """Of the hands' tips from the geoms that they touch [m], by MuJoCo."""
+    scene, model = scenario(name), posed_model(name)
+    path = planned(name)
+    tilt, _ = asked(path.schedule, index, progress)
+    data = posed(scene, model, path.at(index, progress)[0], tilt)
+    return np.array(
+        [
+            mujoco.mj_geomDistance(
+                model, data, model.geom(tip_geom(hand)).id, model.geom(hand.geom).id, 1.0, None
+            )
+            for hand in scene.hands
+        ]
     )
 
 
-def assert_stopped(scene, reason, earliest_deg, latest_deg):
-    """The path is refused for one reason, between two tilts [deg]; returns the message."""
-    with pytest.raises(PathError) as error:
-        plan(scene)
-    found = error.value
-    assert earliest_deg <= found.tilt_deg <= latest_deg
-    assert any(reason in r for r in found.reasons), found.reasons
-    message = str(found)
-    assert f"only up to a tilt of {found.tilt_deg:.1f} deg" in message
-    assert all(r in message for r in found.reasons)
-    return found.reasons
+@each_scenario
+def test_hands_start_their_standoff_away_and_are_clear_until_they_touch(name):
+    scene, path = scenario(name), planned(name)
+    np.testing.assert_array_equal(path.start, path.q[0][0])
+    np.testing.assert_array_equal(path.start, path.at(0, 0.0)[0])
+    # Faces and round tips: distance along the normal is that of the geoms. MuJoCo's is iterative.
+    assert distances(name, 0, 0.0) == pytest.approx(scene.standoff, abs=1e-6)
+    assert scene.standoff > 0.01
+    for index, phase in enumerate(scene.phases):
+        for progress in (0.25, 0.5, 0.75, 1.0):
+            _, gap = asked(path.schedule, index, progress)
+            assert distances(name, index, progress) == pytest.approx(gap, abs=1e-6)
+            assert gap == 0.0 or path.schedule.free[index], phase.name
 
 
-def test_box_out_of_reach_is_refused_at_the_start():
-    plan(moved(BOX, 0.0))
-    reasons = assert_stopped(moved(BOX, 0.25), "out of reach of the arms", 0.0, 0.0)
-    assert len(reasons) == 1
+@each_scenario
+def test_hands_approach_and_leave_along_the_normals(name):
+    scene, path, model = scenario(name), planned(name), posed_model(name)
+    moving = 0
+    for index in np.flatnonzero(path.schedule.free):
+        tilt = asked(path.schedule, index, 0.0)[0]
+        R_WO, _ = ScrewPath(scene.path).pose(tilt)
+        for hand in scene.hands:
+            tips = []
+            for progress in np.linspace(0.0, 1.0, 7):
+                data = posed(scene, model, path.at(index, progress)[0], tilt)
+                tips.append(data.site(tip_site(hand)).xpos.copy())
+            way = np.array(tips) - tips[0]
+            along = way @ (R_WO @ hand.normal_O)
+            across = way - np.outer(along, R_WO @ hand.normal_O)
+            assert np.abs(across).max() < BETWEEN
+            moving += np.abs(along).max() > 0.004
+    assert moving >= 2 * len(scene.hands)
 
 
-def test_tilt_in_half_a_second_is_refused_at_the_speed_of_the_elbows():
-    fast = replace(BOX, timing=replace(BOX.timing, tilt_s=0.5))
-    # Baxter's arms are symmetric, so that both stop; s, e: 1.5 rad/s, w: 4 rad/s.
-    reasons = assert_stopped(fast, "left_e1 at its speed limit 1.5 rad/s", 0.0, 5.0)
-    assert "right_e1 at its speed limit 1.5 rad/s" in reasons
-    assert not [r for r in reasons if "_w" in r]
+@each_scenario
+def test_holding_a_tilt_is_the_posture_in_which_the_path_comes_through_it(name):
+    path = planned(name)
+    schedule = path.schedule
+    for index, phase in enumerate(schedule.phases):
+        before = schedule.before(index)
+        if phase.grip > 0.0 and phase.tilt > before.tilt:
+            for progress in np.linspace(0.0, 1.0, 11):
+                tilt, _ = asked(schedule, index, progress)
+                # A tilt and its share of the path: a rounding or two of 1 rad.
+                np.testing.assert_allclose(
+                    path.holding(tilt), path.at(index, progress)[0], rtol=0, atol=1e-13
+                )
+            assert np.abs(path.holding(schedule.end / 2) - path.holding(schedule.end)).max() > 0.01
 
 
-def test_an_obstacle_in_the_arm_s_way_is_named_with_the_link():
-    blocked = replace(BOX, environment=(*BOX.environment, POST))
-    reasons = assert_stopped(blocked, "post within 5 mm of left_", 5.0, 15.0)
-    assert not [r for r in reasons if "right" in r]
-
-
-def test_a_contact_point_that_is_no_number_is_never_reached():
-    nowhere = replace(BOX.hands[0], p_OC_O=(np.nan, 0.1, 0.0))
-    with pytest.raises(PathError, match=r"tilt of 0\.0 deg"):
-        plan(replace(BOX, hands=(nowhere, BOX.hands[1])))
-
-
-def with_robot(tmp_path, monkeypatch, edit):
-    """Makes the scene's robot an edited copy of Baxter; the scenario's data cannot do that."""
-    spec = mujoco.MjSpec.from_file(str(asset_path("baxter.xml")))
-    edit(spec)
-    spec.compile()
-    copy = tmp_path / "baxter.xml"
-    copy.write_text(spec.to_xml())
-    monkeypatch.setattr(
-        "sim.scene.asset_path", lambda name: copy if name == "baxter.xml" else asset_path(name)
-    )
-
-
-@pytest.mark.parametrize(
-    ("side", "low", "high", "reason"),
-    [
-        ("left", -0.9, -0.5, "left_w2 at its upper limit -0.500 rad"),
-        ("right", 0.5, 0.9, "right_w2 at its lower limit 0.500 rad"),
-    ],
-)
-def test_a_joint_range_in_the_way_is_named(tmp_path, monkeypatch, side, low, high, reason):
-    def narrow(spec):
-        spec.joint(f"{side}_w2").range = [low, high]
-
-    with_robot(tmp_path, monkeypatch, narrow)
-    # The unrestricted path leaves that range soon; the arm's redundancy makes up for it till late.
-    reasons = assert_stopped(BOX, reason, 45.0, 89.0)
-    assert all(r.startswith(side) for r in reasons)
-
-
-def test_an_unedited_copy_of_the_robot_is_planned_alike(tmp_path, monkeypatch):
-    with_robot(tmp_path, monkeypatch, lambda spec: None)
-    # The copy is printed with six digits; the largest joint angle is 2 rad.
-    np.testing.assert_allclose(plan(BOX).q, planned("box-tilt").q, rtol=0, atol=1e-4)
+@each_scenario
+@pytest.mark.parametrize("share", [-0.01, 1.01, np.nan])
+def test_a_tilt_that_the_path_does_not_come_through_is_refused(name, share):
+    path = planned(name)
+    with pytest.raises(InvalidInputError, match=r"^tilt: got .* deg; valid is between 0 and"):
+        path.holding(share * path.schedule.end)

@@ -10,14 +10,20 @@ from scipy.spatial.transform import Rotation
 from scenarios import scenario
 from sim.monitor import ContactHistory, Monitor
 from sim.path import ScrewPath
-from sim.settings import Timing
+from sim.schedule import Schedule
+from sim.settings import Phase
 from sim.trace import Trace
 
 GRIP_S, MOVE_S = 0.05, 0.2
-BOX = replace(scenario("box-tilt"), timing=Timing(grip_s=GRIP_S, tilt_s=MOVE_S, hold_s=0.05))
+PHASES = (
+    Phase("grip", GRIP_S, tilt=0.0, gap=0.0, grip=1.0),
+    Phase("tilt", MOVE_S, tilt=1.0, gap=0.0, grip=1.0),
+    Phase("hold", 0.05, tilt=1.0, gap=0.0, grip=1.0),
+)
+BOX = replace(scenario("box-tilt"), standoff=0.0, phases=PHASES)
 DT = BOX.physics.timestep
 SETTLED = round(GRIP_S / DT)
-STEPS = round(BOX.timing.total_s / DT)
+STEPS = round(Schedule(BOX).total_s / DT)
 LEFT, RIGHT, EDGE_LEFT, EDGE_RIGHT = range(4)
 FIELDS = ("R_WC", "w_OC_C", "kept", "slip", "slide", "spin", "utilisation")
 # Sums of 300 terms of 1e-3 and rotations of points at 1 m.
@@ -38,6 +44,7 @@ def trace_of(tilt, rate):
     path = ScrewPath(BOX.path)
     trace = Trace.allocate(len(tilt), 14, 2, 4)
     trace.t[:] = DT * np.arange(len(tilt))
+    trace.phase[:] = np.searchsorted(Schedule(BOX).ends - DT / 2.0, trace.t, side="right")
     poses = [path.pose(angle) for angle in tilt]
     R_WO, p_WO = np.array([R for R, _ in poses]), np.array([p for _, p in poses])
     trace.p_WO[:], trace.quat_WO[:] = p_WO, quaternions(R_WO)
@@ -278,6 +285,26 @@ def test_a_lost_contact_is_not_kept():
     expected[100:110, RIGHT] = False
     np.testing.assert_array_equal(history.kept, expected)
     np.testing.assert_array_equal(history.utilisation[100:110, RIGHT], 0.0)
+
+
+def test_drift_counts_only_while_the_object_is_held_with_full_grip():
+    # The last phase lets go instead of holding: from there on nothing counts any more.
+    leaving = replace(BOX, phases=(*PHASES[:2], replace(PHASES[2], name="let go", grip=0.0)))
+    trace = resting()
+    translate(trace, LEFT, np.tile(0.02 * TANGENT, (STEPS, 1)))
+    trace.twist_WE[:, LEFT, 3:] += BOX.hands[LEFT].normal_O
+    let_go = round((GRIP_S + MOVE_S) / DT)
+    there, held = Monitor(leaving).update(trace), watched(trace)
+    for rows in (slice(0, SETTLED), slice(let_go, None)):
+        np.testing.assert_array_equal(there.slip[rows], 0.0)
+        assert np.ptp(there.slide[rows], axis=0).max() == 0.0
+        assert np.ptp(there.spin[rows], axis=0).max() == 0.0
+    np.testing.assert_array_equal(there.slip[:let_go], held.slip[:let_go])
+    np.testing.assert_array_equal(there.slide[:let_go], held.slide[:let_go])
+    # With a phase that holds, it does count.
+    assert held.slip[-1, LEFT] > there.slip[let_go - 1, LEFT] + 5e-4
+    assert held.slide[-1, LEFT] > there.slide[-1, LEFT] + 5e-4
+    assert there.slip[let_go - 1, LEFT] > 1e-3
 
 
 # --- blocks ---

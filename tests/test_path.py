@@ -10,15 +10,12 @@ from scipy.linalg import expm
 from scipy.spatial.transform import Rotation
 
 from scenarios import scenario
-from sim.path import Schedule, ScrewPath, minimum_jerk, rotation
+from sim.path import ScrewPath, minimum_jerk, rotation
 from sim.scenario import Pivot, Pose
-from sim.settings import Timing
 from synthesis import InvalidInputError
 
 # Positions are of the order of 1 m and angles of 1 rad: a few roundings of 2e-16 each.
 ROUNDING = 1e-13
-TIMING = Timing(grip_s=0.7, tilt_s=5.0, hold_s=0.4)
-END = np.radians(80.0)
 
 unit_floats = st.floats(-1.0, 1.0)
 vectors = st.tuples(unit_floats, unit_floats, unit_floats)
@@ -201,7 +198,7 @@ def test_tilt_of_an_array_is_the_tilt_of_each():
     np.testing.assert_allclose(path.tilt(q), angles, rtol=0, atol=10.0 * ROUNDING)
 
 
-# --- the timing ---
+# --- the profile in time ---
 
 
 def derivatives_at_ends(profile, h=1e-4):
@@ -238,50 +235,3 @@ def test_minimum_jerk_velocity_is_the_derivative_and_never_negative():
 def test_minimum_jerk_stays_at_its_ends_outside_the_interval():
     np.testing.assert_array_equal(minimum_jerk(np.array([-2.0, 0.0, 1.0, 5.0]))[0], [0, 0, 1, 1])
     np.testing.assert_array_equal(minimum_jerk(np.array([-2.0, 0.0, 1.0, 5.0]))[1], 0.0)
-
-
-def test_phases_follow_each_other_at_the_ends_of_their_durations():
-    schedule = Schedule(TIMING, END)
-    times = [0.0, 0.69, 0.7, 5.69, 5.7, 6.1]
-    expected = ["grip", "grip", "tilt", "tilt", "hold", "hold"]
-    assert [schedule.phase(t) for t in times] == expected
-    assert schedule.settled_s == 0.7
-
-
-def test_reference_rests_while_gripping_and_holding_and_rises_between():
-    schedule = Schedule(TIMING, END)
-    rests = np.array([0.0, 0.35, 0.7, 5.7, 6.1])
-    tilt, rate = schedule.tilt(rests)
-    # 5.7 s - 0.7 s is not exactly 5 s.
-    np.testing.assert_allclose(tilt, [0.0, 0.0, 0.0, END, END], rtol=0, atol=1e-15)
-    np.testing.assert_allclose(rate, 0.0, rtol=0, atol=1e-15)
-    assert (np.diff(schedule.tilt(np.linspace(0.71, 5.69, 500))[0]) > 0.0).all()
-
-
-def test_grip_is_built_up_before_the_tilt_starts():
-    share = Schedule(TIMING, END).grip(np.array([0.0, 0.35, 0.7, 3.0, 6.1]))
-    np.testing.assert_allclose(share, [0.0, 0.5, 1.0, 1.0, 1.0], rtol=0, atol=1e-15)
-
-
-def test_rate_is_the_derivative_of_the_tilt():
-    schedule = Schedule(TIMING, END)
-    t, h = np.linspace(0.01, 6.09, 1000), 1e-5
-    slope = (schedule.tilt(t + h)[0] - schedule.tilt(t - h)[0]) / (2.0 * h)
-    # As for the profile; 80 deg over 5 s make the derivatives smaller.
-    np.testing.assert_allclose(schedule.tilt(t)[1], slope, rtol=0, atol=2e-9)
-    # A millisecond's delay is caught.
-    assert np.abs(schedule.tilt(t + 1e-3)[1] - slope).max() > 1e-5
-
-
-def test_times_invert_the_reference_tilt():
-    schedule = Schedule(TIMING, END)
-    angles = np.linspace(0.0, END, 200)
-    times = schedule.times(angles)
-    assert (np.diff(times) > 0.0).all()
-    assert times[0] == TIMING.grip_s
-    # Linear interpolation over dt = 0.5 ms: dt^2 / 8 times the largest acceleration,
-    # 5.77 * END / tilt_s^2 = 0.32 rad/s^2.
-    bound = 0.33 * 0.0005**2 / 8.0
-    np.testing.assert_allclose(schedule.tilt(times)[0], angles, rtol=0, atol=bound)
-    # A millisecond's delay is caught.
-    assert np.abs(schedule.tilt(times + 1e-3)[0] - angles).max() > 100.0 * bound

@@ -1,66 +1,16 @@
-"""The plant's forces obey Newton, its readings are copies, and it fails loudly, not with NaN."""
+"""The plant's forces obey Newton, and what touches against the scenario's will is named."""
 
 import itertools
 from dataclasses import replace
-from functools import cache
 
 import mujoco
 import numpy as np
 import pytest
-from dm_control.rl.control import PhysicsError
 from scipy.spatial.transform import Rotation
 
-from scenarios import scenario
-from sim.contacts import ContactFrames
-from sim.ik import plan_joints
-from sim.path import Schedule, ScrewPath
 from sim.plant import Plant
-from sim.robot import RobotModel
-from sim.scenario import GRAVITY, Geom, Pose
-from sim.scene import compose
-from sim.settings import Physics
-
-BOX = scenario("box-tilt")
-WEIGHT = BOX.object.mass * GRAVITY
-ROBOT = RobotModel(BOX)
-FRAMES = ContactFrames(BOX)
-HANDS = len(BOX.hands)
-# Joint impedance that keeps the arms where they are while they push [rad/s].
-BANDWIDTH = 30.0
-
-
-@cache
-def planned():
-    path = ScrewPath(BOX.path)
-    return plan_joints(BOX, path, Schedule(BOX.timing, path.end))
-
-
-def plant_at(tilt_deg):
-    """A plant that starts at rest at a tilt, and the arms' angles there."""
-    R_WO, p_WO = ScrewPath(BOX.path).pose(np.radians(tilt_deg))
-    quaternion = Rotation.from_matrix(R_WO).as_quat(scalar_first=True)
-    start = Pose(tuple(p_WO.tolist()), tuple(quaternion.tolist()))
-    plant = Plant(replace(BOX, path=replace(BOX.path, start=start)))
-    q = planned()(np.radians(tilt_deg))[0]
-    plant.reset(q)
-    return plant, q
-
-
-def rotation_of(measurement):
-    return Rotation.from_quat(measurement.quat_WO, scalar_first=True).as_matrix()
-
-
-def push(plant, q_d, f_n, steps):
-    """Steps with a feed-forward for normal forces f_n [N], (2,), around angles q_d."""
-    for _ in range(steps):
-        m = plant.measure()
-        R_WO = rotation_of(m)
-        ROBOT.update(m.q)
-        p_WC, R_WC = FRAMES.points(R_WO, m.p_WO)[:HANDS], FRAMES.in_world(R_WO)[:HANDS]
-        forces = np.einsum("nl,n->l", ROBOT.contact_jacobians(p_WC, R_WC)[:, 2], f_n)
-        impedance = BANDWIDTH**2 * (q_d - m.q) - 2.0 * BANDWIDTH * m.qd
-        plant.apply(ROBOT.gravity() + forces + ROBOT.mass_matrix() @ impedance)
-        plant.step()
+from sim.scenario import Geom, Pose
+from tests.plants import BOX, FRAMES, HANDS, WEIGHT, planned, plant_at, push, rotation_of, start_at
 
 
 def named_contacts(plant):
@@ -262,156 +212,65 @@ def test_contacts_near_a_named_point_add_up_there():
     np.testing.assert_array_equal(standing(board, (-0.15, 0.0, -0.05)), 0.0)
 
 
-# --- state ---
+# --- what must not touch ---
+
+POST = Geom("post", "sphere", (0.05,))
 
 
-def test_measurements_are_copies():
-    plant, q = plant_at(30.0)
-    push(plant, q, (40.0, 40.0), 3)
-    before, again = plant.measure(), plant.measure()
-    for field in ("q", "qd", "p_WO", "quat_WO"):
-        array = getattr(before, field)
-        array += 1.0
-        np.testing.assert_array_equal(getattr(plant.measure(), field), getattr(again, field))
-        np.testing.assert_array_equal(array, getattr(again, field) + 1.0)
+def with_post(at):
+    """The plant at a tilt of 30 deg with a post somewhere [m], in the present contacts."""
+    path = replace(BOX.path, start=start_at(30.0))
+    post = replace(POST, pose=Pose(tuple(at)))
+    plant = Plant(replace(BOX, path=path, environment=(*BOX.environment, post)))
+    plant.reset(planned().holding(np.radians(30.0)))
+    return plant
 
 
-def test_measurement_is_the_state_after_the_step_by_the_names_of_the_joints():
-    plant, q = plant_at(30.0)
-    push(plant, q, (40.0, 40.0), 3)
-    data, measurement = plant.physics.data, plant.measure()
-    assert measurement.t == pytest.approx(3 * BOX.physics.timestep, abs=1e-15)
-    assert plant.joints == ROBOT.joints
-    for i, joint in enumerate(plant.joints):
-        assert measurement.q[i] == data.joint(joint).qpos[0]
-        assert measurement.qd[i] == data.joint(joint).qvel[0]
-    np.testing.assert_array_equal(measurement.p_WO, data.joint("box").qpos[:3])
-    np.testing.assert_array_equal(measurement.quat_WO, data.joint("box").qpos[3:])
-    assert np.abs(measurement.qd).min() > 0.0
+def wrist_at(dx=0.0, dy=0.0, dz=0.0):
+    """Where the left wrist is, and a place beside it [m]."""
+    plant, _ = plant_at(30.0)
+    return plant.physics.named.data.geom_xpos["left_wrist"] + np.array([dx, dy, dz])
 
 
-def test_motors_cut_torques_at_their_limits():
-    states, forces = [], []
-    for scale in (1.0, 1e3, 0.99):
-        plant, _ = plant_at(30.0)
-        plant.apply(scale * ROBOT.tau_max)
+def test_a_link_that_touches_what_stands_around_is_counted_and_named_with_the_time():
+    plant = with_post(wrist_at())
+    assert plant.collisions == {}
+    points, wrenches = np.zeros((4, 3)), np.zeros((4, 4))
+    assert plant.contacts(points, wrenches) > 0
+    (names,) = [pair for pair in plant.collisions if "left_wrist" in pair]
+    assert set(names) == {"left_wrist", "post"}
+    assert plant.collisions[names] == 0.0
+    # It is no contact of the scenario: its force counts nowhere.
+    np.testing.assert_array_equal(wrenches[:HANDS], plant_wrenches_without_post()[:HANDS])
+    # The first time stays, and a reset forgets it.
+    for _ in range(3):
         plant.step()
-        states.append(plant.measure().qd)
-        forces.append(plant.physics.data.actuator_force.copy())
-    np.testing.assert_array_equal(forces[0], ROBOT.tau_max)
-    np.testing.assert_array_equal(forces[1], ROBOT.tau_max)
-    np.testing.assert_array_equal(states[1], states[0])
-    # A torque below the limits is not.
-    assert (forces[2] != forces[0]).all()
-    assert (states[2] != states[0]).all()
+        plant.contacts(points, wrenches)
+    assert plant.collisions[names] == 0.0
+    plant.reset(planned().holding(np.radians(30.0)))
+    assert plant.collisions == {}
 
 
-def states_of(plant, q, steps):
-    plant.reset(q)
-    rows = []
-    for _ in range(steps):
-        push(plant, q, (40.0, 40.0), 1)
-        m = plant.measure()
-        rows.append(np.concatenate([[m.t], m.q, m.qd, m.p_WO, m.quat_WO]))
-    return np.array(rows)
+def plant_wrenches_without_post():
+    return named_contacts(plant_at(30.0)[0])[1]
 
 
-def test_reset_repeats_the_run_bit_for_bit():
-    plant, q = plant_at(30.0)
-    first = states_of(plant, q, 50)
-    np.testing.assert_array_equal(states_of(plant, q, 50), first)
-    np.testing.assert_array_equal(states_of(plant_at(30.0)[0], q, 50), first)
-    # The last bit of a start angle is caught.
-    assert not np.array_equal(states_of(plant, np.nextafter(q, 2.0), 50), first)
+def test_a_link_pushes_back_at_what_it_touches():
+    blocked, free = with_post(wrist_at(0.03, 0.0, 0.03)), plant_at(30.0)[0]
+    for plant in (blocked, free):
+        plant.step()
+    assert np.abs(blocked.measure().qd - free.measure().qd).max() > 1e-2
 
 
-def test_reset_puts_everything_at_rest_at_the_start():
-    plant, q = plant_at(30.0)
-    push(plant, q, (40.0, 40.0), 20)
-    plant.reset(q)
-    m = plant.measure()
-    assert m.t == 0.0
-    np.testing.assert_array_equal(m.q, q)
-    np.testing.assert_array_equal(m.qd, 0.0)
-    np.testing.assert_array_equal(plant.physics.data.ctrl, 0.0)
-    np.testing.assert_array_equal(plant.physics.velocity(), 0.0)
+def test_a_post_beside_the_arm_is_touched_by_nothing():
+    plant = with_post(wrist_at(0.0, 0.4, 0.0))
+    assert plant.contacts(np.zeros((4, 3)), np.zeros((4, 4))) == 0
+    assert plant.collisions == {}
 
 
-# --- divergence ---
-
-
-def fast_box(plant):
-    plant.physics.data.joint("box").qvel[:] = 1e12
-
-
-def nan_angle(plant):
-    plant.physics.data.joint("left_e1").qpos[0] = np.nan
-
-
-def infinite_speed(plant):
-    plant.physics.data.joint("left_e1").qvel[0] = np.inf
-
-
-def nan_torque(plant):
-    plant.apply(np.full(len(plant.joints), np.nan))
-
-
-def huge_force(plant):
-    plant.physics.data.xfrc_applied[:] = 1e20
-
-
-@pytest.mark.parametrize("blow", [fast_box, nan_angle, infinite_speed, nan_torque, huge_force])
-def test_a_diverging_state_is_an_error(blow):
-    plant, q = plant_at(30.0)
-    push(plant, q, (40.0, 40.0), 5)
-    blow(plant)
-    with pytest.raises(PhysicsError, match="mjWARN_BAD"):
-        for _ in range(5):
-            plant.step()
-
-
-def test_a_fast_but_finite_state_is_none():
-    plant, q = plant_at(30.0)
-    plant.physics.data.joint("box").qvel[:] = 1.0
-    push(plant, q, (40.0, 40.0), 20)
-    assert np.isfinite(plant.measure().q).all()
-
-
-# --- the contact settings ---
-
-
-def creep(physics, share):
-    """Speed of a resting box on the table under a sideways push, a share of its friction [µm/s]."""
-    nobody = replace(BOX.robot, posture={})
-    model = compose(replace(BOX, robot=nobody, physics=physics)).compile()
-    data = mujoco.MjData(model)
-    data.xfrc_applied[model.body("box").id, 0] = share * BOX.supports[0].friction.mu * WEIGHT
-    settling = round(0.5 / physics.timestep)
-    mujoco.mj_step(model, data, settling)
-    start = data.qpos[0]
-    mujoco.mj_step(model, data, 2 * settling)
-    assert data.ncon == 4 or share > 1.0
-    return abs(data.qpos[0] - start) * 1e6
-
-
-def test_resting_contact_under_load_does_not_creep():
-    # Measured: 4e-7 µm/s. A run of ten seconds would add 0.1 µm at this bound, of 100 allowed.
-    assert creep(BOX.physics, 0.6) < 0.01
-
-
-@pytest.mark.parametrize(
-    ("loose", "at_least"),
-    [
-        (Physics(noslip_iterations=0), 0.02),
-        (Physics(noslip_iterations=0, impratio=10.0), 0.2),
-        (Physics(noslip_iterations=0, impratio=10.0, solref_friction=(0.01, 1.0)), 1.0),
-    ],
-)
-def test_looser_contact_settings_creep_visibly(loose, at_least):
-    assert creep(loose, 0.6) > at_least
-
-
-def test_box_holds_up_to_its_friction_and_slides_beyond_it():
-    # 5 % either side of the cone; MuJoCo's cone is exact, the corners' loads differ by the push.
-    assert creep(BOX.physics, 0.95) < 0.01
-    assert creep(BOX.physics, 1.05) > 1e4
+def test_the_box_on_the_table_and_the_hands_on_the_box_are_no_collisions():
+    plant, q = plant_at(0.0)
+    push(plant, q, (20.0, 20.0), 50)
+    assert plant.contacts(np.zeros((4, 3)), np.zeros((4, 4))) == 0
+    assert plant.collisions == {}
+    assert np.abs(named_contacts(plant)[1][:HANDS, 1]).min() > 1.0

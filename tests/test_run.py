@@ -6,23 +6,34 @@ import signal
 from dataclasses import asdict, replace
 from importlib.metadata import version
 
+import numpy as np
 import pytest
 
 from scenarios import scenario
+from scenarios.cli import main
 from sim.ik import PathError
+from sim.loop import ClosedLoop, DivergedError
+from sim.plant import Plant
 from sim.report import Verdict
 from sim.run import Request, execute, markdown, resolved_config
-from sim.settings import Timing
+from sim.settings import Phase, stretched
 
-# The first 5 deg of the box tilt, which passes: 1.7 s of simulated time.
+# The first 5 deg of the box tilt, which passes: 1.9 s of simulated time.
+PHASES = (
+    Phase("touch", 0.2, tilt=0.0, gap=0.0, grip=0.0),
+    Phase("grip", 0.4, tilt=0.0, gap=0.0, grip=1.0),
+    Phase("tilt", 1.2, tilt=1.0, gap=0.0, grip=1.0),
+    Phase("hold", 0.1, tilt=1.0, gap=0.0, grip=1.0),
+)
 SCENARIO = scenario("box-tilt")
 SCENARIO = replace(
     SCENARIO,
-    timing=Timing(grip_s=0.4, tilt_s=1.2, hold_s=0.1),
+    standoff=0.002,
+    phases=PHASES,
     path=replace(SCENARIO.path, angle_deg=5.0),
 )
 # 90 deg in 50 ms ask for 34 rad/s of hands on arms of 1.5 rad/s.
-TOO_FAST = replace(scenario("box-tilt"), timing=Timing(tilt_s=0.05))
+TOO_FAST = replace(SCENARIO, phases=stretched(scenario("box-tilt").phases, 0.05))
 
 
 def request(**options):
@@ -70,7 +81,8 @@ def test_a_run_leaves_recording_configuration_and_report(result, folder):
 def test_the_configuration_is_the_resolved_scenario(result, folder):
     config = strict_json(folder / "config.json")
     assert config["scenario"] == plain(asdict(SCENARIO))
-    assert config["scenario"]["timing"] == {"grip_s": 0.4, "tilt_s": 1.2, "hold_s": 0.1}
+    assert config["scenario"]["phases"] == [asdict(phase) for phase in PHASES]
+    assert config["scenario"]["standoff"] == 0.002
     assert config["scenario"]["path"]["angle_deg"] == 5.0
     assert config["control"] == plain(asdict(SCENARIO.control))
     assert (config["controller"], config["seed"]) == ("margin", 4)
@@ -106,8 +118,8 @@ def test_the_written_report_is_the_returned_one(result, folder):
 
 
 def test_progress_counts_up_to_all_steps(result, progress):
-    assert progress[-1] == (1700, 1700)
-    assert [done for done, _ in progress] == list(range(100, 1701, 100))
+    assert progress[-1] == (1900, 1900)
+    assert [done for done, _ in progress] == list(range(100, 1901, 100))
 
 
 def test_the_text_of_the_verdict_holds_verdict_contacts_and_failures(result):
@@ -153,3 +165,66 @@ def test_a_signal_ends_the_run_after_the_present_block_with_a_complete_record(tm
     assert strict_json(tmp_path / "report.json")["verdict"] == "interrupted"
     # Ctrl-C works as before once the run is over.
     assert [signal.getsignal(n) for n in (signal.SIGINT, signal.SIGTERM)] == before
+
+
+# --- divergence ---
+
+
+def blow_up(monkeypatch, step):
+    """Makes the plant's state run away in a step, counted from 0."""
+    steps, made = [], Plant.step
+
+    def stepped(plant):
+        if len(steps) == step:
+            plant.physics.data.joint("box").qvel[:] = 1e12
+        steps.append(plant.measure().t)
+        made(plant)
+
+    monkeypatch.setattr(Plant, "step", stepped)
+
+
+@pytest.mark.parametrize("step", [250, 300, 399, 1])
+def test_a_diverged_run_keeps_every_step_before_and_says_when(monkeypatch, tmp_path, result, step):
+    blow_up(monkeypatch, step)
+    diverged = execute(request(seed=4, out=tmp_path))
+    report = diverged.report
+    assert report.verdict is Verdict.FAIL
+    assert report.failures[-1] == (
+        f"the simulation diverged at {1e-3 * step:.3f} s; check the scenario's physics."
+    )
+    # The blocks before, and of the last one what had been done.
+    assert len(diverged.trace) == len(diverged.history.kept) == step
+    np.testing.assert_array_equal(diverged.trace.tau, result.trace.tau[:step])
+    np.testing.assert_array_equal(diverged.trace.tilt, result.trace.tilt[:step])
+    assert strict_json(tmp_path / "report.json")["verdict"] == "fail"
+    assert report.timing.sim_s == pytest.approx(1e-3 * step, abs=1e-12)
+
+
+def test_the_loop_raises_only_after_it_has_handed_over_the_last_rows(monkeypatch):
+    blow_up(monkeypatch, 250)
+    loop, blocks = ClosedLoop(SCENARIO, SCENARIO.control), []
+    with pytest.raises(DivergedError, match=r"diverged at 0\.250 s"):
+        for block in loop.run():
+            blocks.append(len(block))
+    assert blocks == [100, 100, 50]
+    assert loop.steps == 250
+
+
+def test_a_run_that_does_not_run_away_does_not_diverge(monkeypatch):
+    blow_up(monkeypatch, -1)
+    assert execute(request()).report.verdict is Verdict.PASS
+
+
+def test_divergence_in_the_first_step_is_one_sentence_and_code_2(monkeypatch, tmp_path, capsys):
+    blow_up(monkeypatch, 0)
+    with pytest.raises(DivergedError):
+        execute(request())
+    monkeypatch.undo()
+    blow_up(monkeypatch, 0)
+    assert main(["run", "box-tilt", "--out", str(tmp_path / "out")]) == 2
+    output, errors = capsys.readouterr()
+    assert output == ""
+    assert errors == (
+        "fulcrum: the simulation diverged at 0.000 s; check the scenario's physics.\n"
+    )
+    assert not (tmp_path / "out" / "report.json").exists()

@@ -10,12 +10,18 @@ from scipy.spatial.transform import Rotation
 from scenarios import scenario, scenarios
 from sim.contacts import ContactFrames, contacts, true_contacts
 from sim.ik import plan_joints
-from sim.path import Schedule, ScrewPath
-from sim.plant import Measurement
+from sim.path import ScrewPath
 from sim.robot import RobotModel
 from sim.settings import Control
-from sim.statics import Statics
-from synthesis import ContactModel, InfeasibleError, Objective, Role, Synthesizer
+from sim.statics import HoldingProblems, Statics
+from synthesis import (
+    ContactModel,
+    InfeasibleError,
+    InvalidInputError,
+    Objective,
+    Role,
+    Synthesizer,
+)
 
 BOX = scenario("box-tilt")
 PAPER = Control(friction_factor=1.0, preload=0.0)
@@ -31,22 +37,16 @@ def robot(name):
 
 @cache
 def planned(name):
-    scene = scenario(name)
-    path = ScrewPath(scene.path)
-    return plan_joints(scene, path, Schedule(scene.timing, path.end))
-
-
-def measured(name, tilt_deg, t=0.0):
-    """The state on the planned path at a tilt."""
-    tilt = np.radians(tilt_deg)
-    R_WO, p_WO = ScrewPath(scenario(name).path).pose(tilt)
-    q = planned(name)(tilt)[0]
-    quaternion = Rotation.from_matrix(R_WO).as_quat(scalar_first=True)
-    return Measurement(t, q, np.zeros(len(q)), p_WO, quaternion)
+    return plan_joints(scenario(name))
 
 
 def problem_at(scene, control, tilt_deg):
-    return Statics(scene, control, robot(scene.name)).problem(measured(scene.name, tilt_deg))
+    """The problem on the planned path at a tilt, with the arms where they hold it there."""
+    tilt, belief = np.radians(tilt_deg), robot(scene.name)
+    R_WO, p_WO = ScrewPath(scene.path).pose(tilt)
+    quaternion = Rotation.from_matrix(R_WO).as_quat(scalar_first=True)
+    belief.update(planned(scene.name).holding(tilt))
+    return Statics(scene, control, belief).problem(p_WO, quaternion)
 
 
 # --- the paper's numbers; 0.005 N is its last printed digit ---
@@ -132,12 +132,12 @@ def test_weight_acts_at_the_centre_of_mass_in_the_object_s_axes(name, tilt_deg):
 @each_scenario
 def test_joints_of_the_problem_are_the_robot_s_at_the_measured_angles(name):
     problem, belief = problem_at(scenario(name), PAPER, 30.0), robot(name)
-    belief.update(planned(name)(np.radians(30.0))[0])
+    belief.update(planned(name).holding(np.radians(30.0)))
     assert problem.joints.names == belief.joints
     np.testing.assert_array_equal(problem.joints.tau_min, belief.tau_min)
     np.testing.assert_array_equal(problem.joints.tau_max, belief.tau_max)
     np.testing.assert_array_equal(problem.joints.tau_g, belief.gravity())
-    belief.update(planned(name)(np.radians(31.0))[0])
+    belief.update(planned(name).holding(np.radians(31.0)))
     assert np.abs(problem.joints.tau_g - belief.gravity()).max() > 1e-3
 
 
@@ -147,7 +147,8 @@ def test_statics_balances_a_virtual_motion_of_hands_and_object(name):
     problem, h = problem_at(scenario(name), PAPER, 30.0), 1e-6
     tilt = np.radians(30.0)
     path = ScrewPath(scenario(name).path)
-    slope = planned(name)(tilt)[1]
+    d = 1e-4
+    slope = (planned(name).holding(tilt + d) - planned(name).holding(tilt - d)) / (2.0 * d)
     wrenches = np.random.default_rng(0).normal(size=(len(problem.contacts), 6))
     wrenches[:, 3:5] = 0.0
     tau = problem.torque(wrenches) - problem.joints.tau_g
@@ -158,7 +159,8 @@ def test_statics_balances_a_virtual_motion_of_hands_and_object(name):
         p, R_WC = problem.p_OC_O[i], R_WO @ problem.R_OC[i]
         velocity = (p_b + R_b @ p - p_a - R_a @ p) / (2.0 * h)
         work += R_WC @ wrenches[i, :3] @ velocity + R_WC @ wrenches[i, 3:] @ path.axis
-    # Central differences leave rounding over 2 h, 1e-10; the spline's slope 1e-6 of the path.
+    # Central differences leave rounding over 2 h, 1e-10, and d^2 / 6 times a third derivative of
+    # the path of ~10 rad: 2e-8; the spline's slope is off by 1e-6.
     assert tau @ slope == pytest.approx(work, abs=2e-5)
     assert abs(tau @ slope) > 1e-2
 
@@ -207,3 +209,54 @@ def test_contact_frames_agree_between_object_and_world(name):
 @pytest.mark.parametrize("objective", Objective)
 def test_the_control_s_objective_is_the_problem_s(objective):
     assert problem_at(BOX, replace(PAPER, objective=objective), 0.0).objective is objective
+
+
+# --- the problems along the path ---
+
+
+def same(first, second):
+    """Whether two problems have the same numbers, bit by bit."""
+    pairs = [(getattr(first, n), getattr(second, n)) for n in ("R_OC", "p_OC_O", "w_ext_O")]
+    if None not in (first.joints, second.joints):
+        pairs += [(getattr(first.joints, n), getattr(second.joints, n)) for n in ("J_C", "tau_g")]
+    return all(np.array_equal(a, b) for a, b in pairs)
+
+
+@each_scenario
+def test_holding_problems_are_those_of_the_planned_postures(name):
+    scene = scenario(name)
+    problems = HoldingProblems(scene, PAPER)
+    middle = scene.path.angle_deg / 2.0
+    at_middle = problems.at(np.radians(middle))
+    assert same(at_middle, problem_at(scene, PAPER, middle))
+    # Asked again after another tilt, it is the same; another tilt is another problem.
+    other = problems.at(np.radians(middle + 1.0))
+    assert same(problems.at(np.radians(middle)), at_middle)
+    assert not same(other, at_middle)
+
+
+@each_scenario
+def test_holding_problems_without_joints_are_the_object_s_alone(name):
+    scene = scenario(name)
+    middle = scene.path.angle_deg / 2.0
+    alone = HoldingProblems(scene, PAPER, with_joints=False).at(np.radians(middle))
+    assert alone.joints is None
+    assert same(alone, problem_at(scene, PAPER, middle))
+
+
+@each_scenario
+def test_a_problem_is_that_of_the_angles_to_which_the_robot_was_last_updated(name):
+    scene, belief = scenario(name), RobotModel(scenario(name))
+    R_WO, p_WO = ScrewPath(scene.path).pose(0.1)
+    quaternion = Rotation.from_matrix(R_WO).as_quat(scalar_first=True)
+    statics, found = Statics(scene, PAPER, belief), []
+    for tilt in (0.1, 0.2, 0.1):
+        belief.update(planned(name).holding(tilt))
+        found.append(statics.problem(p_WO, quaternion))
+    assert same(found[0], found[2])
+    assert not same(found[0], found[1])
+
+
+def test_a_tilt_beyond_the_path_has_no_holding_problem():
+    with pytest.raises(InvalidInputError, match=r"^tilt: got 95 deg; valid is between 0 and 90"):
+        HoldingProblems(BOX, PAPER).at(np.radians(95.0))

@@ -1,0 +1,227 @@
+"""Scenarios that contradict themselves, or what is shipped, are refused by name."""
+
+import math
+from dataclasses import replace
+
+import mujoco
+import pytest
+
+from assets import asset_path
+from scenarios import scenario
+from sim.robot import pinocchio_model
+from sim.scenario import Friction, Geom
+from sim.scene import compose
+from sim.settings import Physics
+from synthesis import InvalidInputError
+
+BOX = scenario("box-tilt")
+
+
+def with_hand(**changes):
+    return replace(BOX, hands=(replace(BOX.hands[0], **changes), BOX.hands[1]))
+
+
+def with_support(**changes):
+    return replace(BOX, supports=(replace(BOX.supports[0], **changes), BOX.supports[1]))
+
+
+def assert_refused(make, field, given, valid):
+    with pytest.raises(InvalidInputError) as error:
+        compose(make())
+    assert error.value.field == field
+    message = str(error.value)
+    assert message.startswith(f"{field}: got {given}; valid is ")
+    assert valid in message.partition("valid is")[2]
+
+
+def test_the_scenario_itself_is_composed():
+    assert compose(with_hand()).compile().nu == len(BOX.robot.posture)
+
+
+def test_a_joint_that_the_robot_lacks_is_refused_by_name():
+    robot = replace(BOX.robot, posture={**BOX.robot.posture, "left_s9": 0.1})
+    assert_refused(lambda: replace(BOX, robot=robot), "robot.posture", "left_s9", "left_s0")
+
+
+def test_a_mount_that_the_robot_lacks_is_refused_by_name():
+    assert_refused(
+        lambda: with_hand(mount="left_foot"), "left.mount", "left_foot", "left_hand_link"
+    )
+
+
+def test_a_geom_kind_that_mujoco_lacks_is_refused_by_name():
+    pyramid = Geom("pyramid", "pyramid", (0.1, 0.1))
+    environment = (*BOX.environment, pyramid)
+    assert_refused(
+        lambda: replace(BOX, environment=environment), "pyramid.kind", "pyramid", "sphere, capsule"
+    )
+
+
+def test_a_contact_on_a_geom_that_the_object_lacks_is_refused_by_name():
+    assert_refused(lambda: with_hand(geom="lid"), "left.geom", "lid", "one of box")
+    assert_refused(lambda: with_support(geom="lid"), "edge_left.geom", "lid", "one of box")
+
+
+def test_a_support_on_a_surface_that_is_not_there_is_refused_by_name():
+    assert_refused(lambda: with_support(surface="floor"), "edge_left.surface", "floor", "table")
+
+
+def test_two_frictions_between_the_same_geoms_are_refused():
+    # One pair of geoms has one friction in MuJoCo; the second to ask is named.
+    assert_refused(
+        lambda: with_support(friction=Friction(mu=0.2)),
+        "edge_right.friction",
+        "Friction(mu=0.25, e_n=None)",
+        "Friction(mu=0.2, e_n=None), as at other contacts of box on table",
+    )
+
+
+def test_a_hand_model_that_is_not_shipped_is_refused_by_name():
+    with pytest.raises(FileNotFoundError, match=r"'claw.xml'.*palm_pad.xml"):
+        compose(with_hand(model="claw.xml"))
+
+
+# --- what a dataclass refuses when it is made ---
+
+NO_NUMBER_ABOVE_0 = (0.0, -1.0, math.nan, math.inf)
+
+
+@pytest.mark.parametrize("value", NO_NUMBER_ABOVE_0)
+@pytest.mark.parametrize(
+    ("field", "make"),
+    [
+        ("box.mass", lambda v: replace(BOX.object, mass=v)),
+        ("box.inertia", lambda v: replace(BOX.object, inertia=(0.1, v, 0.1))),
+        ("friction.mu", lambda v: Friction(mu=v)),
+        ("friction.e_n", lambda v: Friction(mu=0.1, e_n=v)),
+        ("physics.timestep", lambda v: Physics(timestep=v)),
+        ("physics.impratio", lambda v: Physics(impratio=v)),
+        ("physics.solref", lambda v: Physics(solref=(v, 1.0))),
+        ("physics.solref", lambda v: Physics(solref=(0.01, v))),
+        ("physics.solref_friction", lambda v: Physics(solref_friction=(v, 1.0))),
+        ("physics.solimp", lambda v: Physics(solimp=(0.9, 0.95, v))),
+    ],
+)
+def test_what_must_be_a_finite_number_above_0_is_refused_by_name(field, make, value):
+    make(0.5)
+    with pytest.raises(InvalidInputError, match=rf"^{field}: got {value}; valid is a finite"):
+        make(value)
+
+
+@pytest.mark.parametrize("value", [-1, 2.0, True])
+def test_noslip_iterations_that_are_no_count_are_refused_by_name(value):
+    Physics(noslip_iterations=0)
+    with pytest.raises(
+        InvalidInputError, match=rf"^physics\.noslip_iterations: got {value}; valid"
+    ):
+        Physics(noslip_iterations=value)
+
+
+@pytest.mark.parametrize(("d0", "dmax"), [(0.0, 0.9), (0.95, 0.9), (0.9, 1.0), (math.nan, 0.9)])
+def test_impedances_out_of_order_are_refused_by_name(d0, dmax):
+    with pytest.raises(InvalidInputError, match=r"^physics\.solimp: got .*; valid is 0 < d0 <="):
+        Physics(solimp=(d0, dmax, 0.001))
+
+
+HAND, SUPPORT = BOX.hands[0], BOX.supports[0]
+
+
+@pytest.mark.parametrize("vector", [(0.0, 0.0, 0.0), (0.0, -2.0, 0.0), (0.0, math.nan, 1.0)])
+@pytest.mark.parametrize(
+    ("contact", "field"),
+    [(HAND, "normal_O"), (HAND, "tangent_O"), (SUPPORT, "normal_W"), (SUPPORT, "tangent_W")],
+)
+def test_a_direction_that_is_no_unit_vector_is_refused_by_name(contact, field, vector):
+    with pytest.raises(InvalidInputError) as error:
+        replace(contact, **{field: vector})
+    assert error.value.field == f"{contact.name}.{field}"
+    assert "length 1" in str(error.value)
+
+
+@pytest.mark.parametrize(
+    ("contact", "field"), [(HAND, "tangent_O"), (SUPPORT, "tangent_W")], ids=["hand", "support"]
+)
+def test_a_tangent_that_is_not_perpendicular_to_its_normal_is_refused_by_name(contact, field):
+    t, n = getattr(contact, field), getattr(contact, field.replace("tangent", "normal"))
+    for angle, refused in ((1e-5, True), (1.0, True), (1e-7, False)):
+        oblique = tuple(
+            math.cos(angle) * a + math.sin(angle) * b for a, b in zip(t, n, strict=True)
+        )
+        if not refused:
+            replace(contact, **{field: oblique})
+            continue
+        with pytest.raises(InvalidInputError, match=rf"^{contact.name}\.{field}: .* perpendicular"):
+            replace(contact, **{field: oblique})
+
+
+@pytest.mark.parametrize("value", [0.0, -1.0, math.nan])
+def test_a_largest_force_that_lets_no_hand_press_is_refused_by_name(value):
+    replace(HAND, f_n_max=math.inf)
+    with pytest.raises(InvalidInputError, match=rf"^left\.f_n_max: got {value}; valid"):
+        replace(HAND, f_n_max=value)
+
+
+def test_two_contacts_of_one_name_are_refused():
+    assert_refused(lambda: with_hand(name="right"), "contact names", "right", "no other")
+    assert_refused(lambda: with_support(name="left"), "contact names", "left", "no other")
+
+
+@pytest.mark.parametrize("value", [-1e-3, math.nan, math.inf])
+def test_a_senseless_standoff_is_refused_by_name(value):
+    assert_refused(lambda: replace(BOX, standoff=value), "standoff", value, ">= 0")
+
+
+def test_a_scenario_without_phases_is_refused():
+    assert_refused(lambda: replace(BOX, phases=()), "phases", "()", "at least one")
+
+
+# --- what the assets do not fit ---
+
+
+@pytest.mark.parametrize("angle", [1.71, -1.71])
+def test_a_start_angle_outside_its_joint_s_range_is_refused_by_name(angle):
+    robot = replace(BOX.robot, posture={**BOX.robot.posture, "left_s0": angle})
+    assert_refused(
+        lambda: replace(BOX, robot=robot), "robot.posture.left_s0", angle, "[-1.70168, 1.70168]"
+    )
+    robot = replace(BOX.robot, posture={**BOX.robot.posture, "left_s0": angle / 1.01})
+    compose(replace(BOX, robot=robot))
+
+
+@pytest.mark.parametrize("angle", [math.nan, math.inf])
+def test_a_start_angle_that_is_no_number_is_refused_by_name(angle):
+    with pytest.raises(InvalidInputError, match=rf"^robot\.posture\.left_s0: got {angle}; valid"):
+        replace(BOX.robot, posture={**BOX.robot.posture, "left_s0": angle})
+
+
+@pytest.mark.parametrize(
+    ("right", "wrong", "missing"),
+    [
+        ('body name="pad"', 'body name="palm"', "body pad"),
+        ('geom name="tip"', 'geom name="ball"', "geom tip"),
+        ('site name="tip_center"', 'site name="centre"', "site tip_center"),
+    ],
+)
+def test_a_hand_without_one_of_its_parts_is_refused_by_name(
+    tmp_path, monkeypatch, right, wrong, missing
+):
+    pad, copy = asset_path("palm_pad.xml").read_text(), tmp_path / "palm_pad.xml"
+    monkeypatch.setattr(
+        "sim.scene.asset_path", lambda name: copy if name == "palm_pad.xml" else asset_path(name)
+    )
+    copy.write_text(pad)
+    compose(BOX)
+    assert right in pad
+    copy.write_text(pad.replace(right, wrong))
+    assert_refused(lambda: BOX, "left.model", "palm_pad.xml", missing)
+
+
+def test_a_ball_joint_is_refused_by_name():
+    mjcf = (
+        '<mujoco><worldbody><body><joint name="{0}" type="{0}"/><geom size="1"/></body>'
+        "</worldbody></mujoco>"
+    )
+    for kind in ("hinge", "slide"):
+        pinocchio_model(mujoco.MjModel.from_xml_string(mjcf.format(kind)))
+    with pytest.raises(InvalidInputError, match=r"^joint ball: got a ball joint; valid is a hinge"):
+        pinocchio_model(mujoco.MjModel.from_xml_string(mjcf.format("ball")))
