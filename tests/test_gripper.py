@@ -7,21 +7,19 @@ import mujoco
 import numpy as np
 import pytest
 import trimesh
-from scipy.spatial.transform import Rotation
 
 from assets import asset_path, velocity_limits
 from scenarios import cylinder_tilt
 from scenarios.cylinder_tilt import INNER, OUTER, SCENARIO
-from sim.ik import JointPath, PathError, plan_joints
-from sim.path import Schedule, ScrewPath
-from sim.plant import Measurement
+from sim.ik import PathError, plan_joints
+from sim.poses import PathProblems
 from sim.recording.scenery import Scenery
 from sim.robot import RobotModel
 from sim.scenario import GRAVITY, Scenario
 from sim.scene import compose, tip_geom, tip_site
-from sim.settings import Control
-from sim.statics import Statics
+from sim.settings import Control, stretched
 from synthesis import InfeasibleError, Synthesizer
+from synthesis.contact import Array
 
 FINGERS = ["outer_finger", "inner_finger"]
 SLIDES = ["slide_x", "slide_y", "slide_z"]
@@ -41,15 +39,15 @@ def scene() -> mujoco.MjModel:
     return compose(SCENARIO).compile()
 
 
-def path_to(scenario: Scenario, angle_deg: float) -> tuple[ScrewPath, JointPath]:
-    longer = replace(scenario, path=replace(scenario.path, angle_deg=angle_deg))
-    path = ScrewPath(longer.path)
-    return path, plan_joints(longer, path, Schedule(longer.timing, path.end))
+def to(scenario: Scenario, angle_deg: float) -> Scenario:
+    """The scenario with another angle at the end of its path."""
+    return replace(scenario, path=replace(scenario.path, angle_deg=angle_deg))
 
 
-@pytest.fixture(scope="module")
-def far_path() -> tuple[ScrewPath, JointPath]:
-    return path_to(SCENARIO, FAR)
+def tilting(scenario: Scenario) -> Array:
+    """Joint angles over the tilting phase, (k, l)."""
+    names = [phase.name for phase in scenario.phases]
+    return plan_joints(scenario).q[names.index("tilt")]
 
 
 def posed(model: mujoco.MjModel, q: dict[str, float]) -> mujoco.MjData:
@@ -211,15 +209,14 @@ def test_the_full_cylinder_that_rolls_on_the_floor_is_neither_obstacle_nor_drawn
     full = [replace(g, solid=True) for g in SCENARIO.object.geoms]
     blocked = replace(SCENARIO, object=replace(SCENARIO.object, geoms=tuple(full)))
     with pytest.raises(PathError, match="of rim"):
-        path_to(blocked, 10.0)
+        plan_joints(to(blocked, 10.0))
 
 
-def test_the_fingers_keep_still_while_the_stage_moves(far_path):
-    _, joint_path = far_path
+def test_the_fingers_keep_still_while_the_stage_moves():
     # Still joints take the share 1e-8 / 1e-2 of the 0.8 m that the stage goes.
-    assert np.ptp(joint_path.q[:, 6:], axis=0).max() < 1e-5
-    _, restless = path_to(replace(SCENARIO, robot=replace(SCENARIO.robot, still=())), 20.0)
-    assert np.ptp(restless.q[:, 6:], axis=0).max() > 1e-2
+    assert np.ptp(tilting(to(SCENARIO, FAR))[:, 6:], axis=0).max() < 1e-5
+    restless = replace(SCENARIO, robot=replace(SCENARIO.robot, still=()))
+    assert np.ptp(tilting(to(restless, 20.0))[:, 6:], axis=0).max() > 1e-2
 
 
 @pytest.mark.parametrize(
@@ -232,11 +229,11 @@ def test_the_fingers_keep_still_while_the_stage_moves(far_path):
             "slide_x at its lower limit -0.500 m",
         ),
         (
-            lambda s: replace(s, timing=replace(s.timing, tilt_s=0.5)),
+            lambda s: replace(s, phases=stretched(s.phases, 0.5)),
             "at its speed limit 1 m/s",
         ),
         (
-            lambda s: replace(s, timing=replace(s.timing, tilt_s=0.05)),
+            lambda s: replace(s, phases=stretched(s.phases, 0.05)),
             "wrist_pitch at its speed limit 3 rad/s",
         ),
     ],
@@ -245,23 +242,16 @@ def test_limits_that_stop_the_stage_are_named_with_their_units(
     change: Callable[[Scenario], Scenario], reason: str
 ):
     with pytest.raises(PathError, match=reason):
-        path_to(change(SCENARIO), SCENARIO.path.angle_deg)
+        plan_joints(change(SCENARIO))
 
 
-def reach(scenario: Scenario, control: Control, far_path: tuple[ScrewPath, JointPath]) -> float:
+def reach(scenario: Scenario, control: Control) -> float:
     """The tilt [deg] up to which there is equilibrium with the gripper's motors."""
-    path, joint_path = far_path
-    statics = Statics(scenario, control, RobotModel(scenario))
-    synthesizer = Synthesizer()
+    problems, synthesizer = PathProblems(to(scenario, FAR), control), Synthesizer()
 
     def feasible(tilt_deg: float) -> bool:
-        R_WO, p_WO = path.pose(np.radians(tilt_deg))
-        quaternion = Rotation.from_matrix(R_WO).as_quat(scalar_first=True)
-        q, _ = joint_path(np.radians(tilt_deg))
         try:
-            synthesizer.solve(
-                statics.problem(Measurement(0.0, q, np.zeros_like(q), p_WO, quaternion))
-            )
+            synthesizer.solve(problems.problem(tilt_deg))
         except InfeasibleError:
             return False
         return True
@@ -284,12 +274,12 @@ def reach(scenario: Scenario, control: Control, far_path: tuple[ScrewPath, Joint
         (Control(friction_factor=0.8, preload=10.0), 76.25),
     ],
 )
-def test_friction_sets_how_far_the_cylinder_can_go(control, expected_deg, far_path):
-    assert reach(SCENARIO, control, far_path) == pytest.approx(expected_deg, abs=2 * STEP_DEG)
+def test_friction_sets_how_far_the_cylinder_can_go(control, expected_deg):
+    assert reach(SCENARIO, control) == pytest.approx(expected_deg, abs=2 * STEP_DEG)
 
 
-def test_the_scenario_stays_within_reach_and_weaker_fingers_would_not(far_path):
+def test_the_scenario_stays_within_reach_and_weaker_fingers_would_not():
     end = SCENARIO.path.angle_deg
-    assert 75.0 <= end < reach(SCENARIO, SCENARIO.control, far_path) - 1.0
+    assert 75.0 <= end < reach(SCENARIO, SCENARIO.control) - 1.0
     hands = tuple(replace(hand, f_n_max=24.0) for hand in SCENARIO.hands)
-    assert reach(replace(SCENARIO, hands=hands), SCENARIO.control, far_path) < end
+    assert reach(replace(SCENARIO, hands=hands), SCENARIO.control) < end

@@ -6,12 +6,13 @@ import mujoco
 import numpy as np
 import pytest
 
-from scenarios import scenario, scenarios
+from scenarios import scenario
 from sim.ik import plan_joints
 from sim.path import ScrewPath
 from sim.scene import tip_geom, tip_site
 from synthesis import InvalidInputError
 from tests.postures import asked, between, on_grid, planned, posed, posed_model, tampered
+from tests.runs import NAMES
 
 # Inverse kinematics stops at a pose error of 1e-9; orientation counts at the lever of the tip.
 ON_GRID = 1e-8
@@ -19,7 +20,7 @@ ON_GRID = 1e-8
 # at 1 m, and more near its ends. Measured: 3e-8.
 BETWEEN = 1e-6
 
-each_scenario = pytest.mark.parametrize("name", scenarios())
+each_scenario = pytest.mark.parametrize("name", NAMES)
 
 
 def tip_errors(name, path, where):

@@ -118,7 +118,7 @@ def test_a_hand_that_still_touches_at_the_end_is_caught():
     assert len(report.failures) <= 2
 
 
-def test_the_same_hands_that_withdraw_pass():
+def test_hands_that_withdraw_without_having_tilted_pass():
     report, trace, _ = run(BOX, "leaving")
     assert report.verdict is Verdict.PASS, report.failures
     assert report.tilt.target_deg == 0.0

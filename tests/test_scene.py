@@ -131,7 +131,7 @@ def pair_frictions(model):
 def expected_frictions(scene):
     """Soft fingers carry torsion up to mu e_n f_n; points with friction carry none."""
     touching = [(tip_geom(hand), hand.geom, hand.friction) for hand in scene.hands]
-    touching += [(s.surface, s.geom, s.friction) for s in scene.supports]
+    touching += [(s.surface, s.geom, s.friction) for s in (*scene.supports, *scene.rests)]
     return {
         frozenset((first, second)): (
             (3, [f.mu, f.mu, 0.0]) if f.e_n is None else (4, [f.mu, f.mu, f.mu * f.e_n])
@@ -156,7 +156,7 @@ def unwanted(model):
 
 def expected_unwanted(scene, model):
     """Every geom on a body that joints of the robot carry, with object and environment."""
-    surroundings = {g.name for g in (*scene.object.geoms, *scene.environment)}
+    surroundings = {g.name for g in (*scene.object.geoms, *scene.environment) if g.solid}
     carried = set()
     for body in range(model.nbody):
         parent = int(model.body_parentid[body])
@@ -176,7 +176,8 @@ def test_robot_links_touch_object_and_environment_through_pairs_of_their_own(sce
     assert set(found) == expected_unwanted(scene, model)
     # The tips, too, may touch nothing but the geom that they hold.
     for hand in scene.hands:
-        others = {g.name for g in (*scene.object.geoms, *scene.environment)} - {hand.geom}
+        solid = {g.name for g in (*scene.object.geoms, *scene.environment) if g.solid}
+        others = solid - {hand.geom}
         assert {frozenset((tip_geom(hand), other)) for other in others} <= set(found)
 
 

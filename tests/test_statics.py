@@ -11,9 +11,10 @@ from scenarios import scenario, scenarios
 from sim.contacts import ContactFrames, contacts, true_contacts
 from sim.ik import plan_joints
 from sim.path import ScrewPath
+from sim.poses import PathProblems
 from sim.robot import RobotModel
 from sim.settings import Control
-from sim.statics import HoldingProblems, Statics
+from sim.statics import Statics
 from synthesis import (
     ContactModel,
     InfeasibleError,
@@ -223,23 +224,23 @@ def same(first, second):
 
 
 @each_scenario
-def test_holding_problems_are_those_of_the_planned_postures(name):
+def test_path_problems_are_those_of_the_planned_postures(name):
     scene = scenario(name)
-    problems = HoldingProblems(scene, PAPER)
+    problems = PathProblems(scene, PAPER)
     middle = scene.path.angle_deg / 2.0
-    at_middle = problems.at(np.radians(middle))
+    at_middle = problems.problem(middle)
     assert same(at_middle, problem_at(scene, PAPER, middle))
     # Asked again after another tilt, it is the same; another tilt is another problem.
-    other = problems.at(np.radians(middle + 1.0))
-    assert same(problems.at(np.radians(middle)), at_middle)
+    other = problems.problem(middle + 1.0)
+    assert same(problems.problem(middle), at_middle)
     assert not same(other, at_middle)
 
 
 @each_scenario
-def test_holding_problems_without_joints_are_the_object_s_alone(name):
+def test_path_problems_without_joints_are_the_object_s_alone(name):
     scene = scenario(name)
     middle = scene.path.angle_deg / 2.0
-    alone = HoldingProblems(scene, PAPER, with_joints=False).at(np.radians(middle))
+    alone = PathProblems(scene, PAPER, with_joints=False).problem(middle)
     assert alone.joints is None
     assert same(alone, problem_at(scene, PAPER, middle))
 
@@ -257,6 +258,6 @@ def test_a_problem_is_that_of_the_angles_to_which_the_robot_was_last_updated(nam
     assert not same(found[0], found[1])
 
 
-def test_a_tilt_beyond_the_path_has_no_holding_problem():
-    with pytest.raises(InvalidInputError, match=r"^tilt: got 95 deg; valid is between 0 and 90"):
-        HoldingProblems(BOX, PAPER).at(np.radians(95.0))
+def test_a_tilt_beyond_the_path_has_no_problem():
+    with pytest.raises(InvalidInputError, match=r"^tilt: got 95.0; valid is from 0 to 90 deg"):
+        PathProblems(BOX, PAPER).problem(95.0)

@@ -1,0 +1,55 @@
+"""A short run that passes, and how to tamper with it: shared by the tests of the report."""
+
+from dataclasses import replace
+from functools import cache
+
+import numpy as np
+
+from scenarios import scenario
+from sim.judge import Judge
+from sim.report import RunInfo
+from sim.robot import RobotModel
+from sim.run import Request, execute
+from sim.settings import Phase
+
+# The first 10 deg of the box tilt: a run of 2.7 s that passes, with grip built up at 0.6 s.
+PHASES = (
+    Phase("touch", 0.2, tilt=0.0, gap=0.0, grip=0.0),
+    Phase("grip", 0.4, tilt=0.0, gap=0.0, grip=1.0),
+    Phase("tilt", 2.0, tilt=1.0, gap=0.0, grip=1.0),
+    Phase("hold", 0.1, tilt=1.0, gap=0.0, grip=1.0),
+)
+SCENARIO = scenario("box-tilt")
+SCENARIO = replace(
+    SCENARIO,
+    standoff=0.002,
+    phases=PHASES,
+    path=replace(SCENARIO.path, angle_deg=10.0),
+)
+LIMITS = SCENARIO.tolerances
+LEFT, RIGHT, EDGE_LEFT, _ = range(4)
+TOUCH_ROW, GRIP_ROW, ROW, LAST = 100, 400, 1700, 2699
+INFO = RunInfo(controller="margin", objective="max-normal-force", seed=3, wall_s=2.0)
+
+
+@cache
+def short_run():
+    """The run, made once per process."""
+    return execute(Request(SCENARIO, "margin", SCENARIO.control))
+
+
+def judge_of(scene):
+    """The judge of a scenario."""
+    robot = RobotModel(scene)
+    return Judge(scene, robot.joints, robot.tau_min, robot.tau_max)
+
+
+def changed(record, field, index, value):
+    """A copy of a trace or history with some entries of one array set."""
+    array = getattr(record, field).copy()
+    array[index] = value
+    return replace(record, **{field: array})
+
+
+def when(trace, row):
+    return f"{trace.t[row]:.2f} s (tilt {np.degrees(trace.tilt[row]):.1f} deg)"
