@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 
 from scenarios import scenario
+from sim.recording import readable
 from sim.schedule import Schedule
 from tests.recordings import NANOSECOND, Content, verified
 
@@ -46,6 +47,12 @@ def killed(tmp_path_factory):
     return folder, 1e-3 * int(told)
 
 
+def content_of(path):
+    """What a recording holds whose writer may have died within a message."""
+    with readable(path) as whole:
+        return Content(whole)
+
+
 def gaps(content, reached):
     """What a killed run that had got to a time [s] lost of it, beyond what it may lose."""
     rates = {(f"plots/{name}", "Scalars:scalars"): 1000 for name in ("tilt", "slip", "torque")}
@@ -63,7 +70,7 @@ def gaps(content, reached):
 def test_a_killed_run_leaves_all_but_the_last_half_second(killed):
     folder, reached = killed
     assert reached < TOTAL_S - 1.0
-    content = Content(folder / "run.rrd")
+    content = content_of(folder / "run.rrd")
     assert gaps(content, reached) == set()
     # What it told is indeed how far it was.
     assert content.end() <= reached + BLOCK
@@ -73,7 +80,7 @@ def test_a_killed_run_leaves_all_but_the_last_half_second(killed):
 
 def test_a_recording_that_lost_more_than_half_a_second_is_caught(killed):
     folder, reached = killed
-    content = Content(folder / "run.rrd")
+    content = content_of(folder / "run.rrd")
     assert len(gaps(content, reached + MAY_BE_LOST + 2 * BLOCK)) == 5
 
 
@@ -86,7 +93,7 @@ def test_a_killed_run_leaves_no_report(killed):
 def recorded_s(path):
     """How far a recording that is being written has got [s]."""
     try:
-        return Content(path).end()
+        return content_of(path).end()
     except (OSError, ValueError, RuntimeError):  # nothing or no series in it yet
         return 0.0
 
@@ -131,3 +138,22 @@ def test_ctrl_c_leaves_a_whole_recording_and_a_report_that_says_interrupted(tmp_
     assert report["timing"]["sim_s"] < TOTAL_S
     verdict = content.text("verdict")
     assert verdict.startswith("# box-tilt: INTERRUPTED\n")
+
+
+def test_a_file_cut_anywhere_gives_its_whole_messages(killed, tmp_path):
+    folder, _ = killed
+    data = (folder / "run.rrd").read_bytes()
+    with readable(folder / "run.rrd") as whole:
+        size = whole.stat().st_size
+    for lost in (1, 17, 1000, 100_000):
+        cut = tmp_path / f"cut_{lost}.rrd"
+        cut.write_bytes(data[: size - lost])
+        with readable(cut) as path:
+            kept = path.stat().st_size
+            assert path.read_bytes() == data[:kept]
+            assert Content(path).end() > 0.0
+        assert kept < size - lost
+        assert cut.stat().st_size == size - lost  # the file itself is left alone
+    # What Rerun says of it without this help.
+    with pytest.raises(Exception, match=r"exceeds file size"):
+        Content(tmp_path / "cut_1.rrd")

@@ -106,7 +106,7 @@ SENTENCES = {
     tilted_off: "The tilt was off by more than the allowed 0.2 deg at {when}; 0.3 deg at worst.",
     ended_off: "The tilt ended at 10.15 deg instead of 10 +- 0.1 deg.",
     cut: "Torques were cut in 1 of 2700 steps, first that of left_e1 at {when}.",
-    found_no_forces: "The synthesis found no forces 2 times, first at {when}; the last were kept.",
+    found_no_forces: "The synthesis found no forces 2 times, first at {when}.",
 }
 
 

@@ -15,6 +15,7 @@ from pathlib import Path
 from rerun.experimental import ViewerClient
 
 from sim.recording.blueprint import TIMELINE
+from sim.recording.cut import MAGIC, readable
 from synthesis import FulcrumError, InvalidInputError
 
 _PACKAGES = "mesa-vulkan-drivers libvulkan1 libegl1 libegl-mesa0 libgl1-mesa-dri"
@@ -25,7 +26,6 @@ _NO_DRAWING = (
 )
 _RERUN = (sys.executable, "-m", "rerun")
 _SIZE = "1920x1080"
-_MAGIC = b"RRF2"  # how a recording begins
 _LOADING_S = 60.0
 _POLL_S = 0.2
 # A view that has just got its data needs some frames until textures and legends stand.
@@ -52,14 +52,15 @@ def recording_file(run: Path) -> Path:
 
 def _is_recording(path: Path) -> bool:
     with path.open("rb") as file:
-        return file.read(len(_MAGIC)) == _MAGIC
+        return file.read(len(MAGIC)) == MAGIC
 
 
 def view(run: Path) -> None:
     """Opens a recording in the Rerun viewer; returns when the viewer is closed."""
-    command = [*_RERUN, str(recording_file(run))]
-    if subprocess.run(command, check=False, stderr=subprocess.DEVNULL).returncode != 0:
-        raise ViewerError(f"view: {_NO_WINDOW}")
+    with readable(recording_file(run)) as path:
+        command = [*_RERUN, str(path)]
+        if subprocess.run(command, check=False, stderr=subprocess.DEVNULL).returncode != 0:
+            raise ViewerError(f"view: {_NO_WINDOW}")
 
 
 def open_viewer() -> str:
@@ -81,8 +82,7 @@ def screenshot(run: Path, at_s: float, picture: Path) -> None:
         InvalidInputError: There is no such recording, or the moment lies outside it.
         ViewerError: This machine cannot draw.
     """
-    path = recording_file(run)
-    with headless_viewer() as client:
+    with readable(recording_file(run)) as path, headless_viewer() as client:
         client.open(str(path.resolve()))
         start, end = _time_range(client)
         if not start <= at_s <= end:
