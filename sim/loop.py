@@ -7,7 +7,7 @@ from collections.abc import Iterator
 import numpy as np
 from dm_control.rl.control import PhysicsError
 
-from sim.contacts import ContactFrames
+from sim.contacts import ContactFrames, rotations
 from sim.controller import Controller
 from sim.ik import plan_joints
 from sim.path import ScrewPath
@@ -90,19 +90,34 @@ class ClosedLoop:
             diverged: PhysicsError | None = None
             for row in range(start, stop):
                 try:
-                    self._step(row)
+                    self._step(row, row - start)
                 except PhysicsError as error:
                     diverged = error
                     break
                 self.steps = row + 1
             block = self.trace.rows(start, self.steps)
             if len(block):
-                block.tilt[:] = self._path.tilt(block.quat_WO)
+                self._complete(block)
                 yield block
             if diverged is not None:
                 raise DivergedError(float(self.trace.t[self.steps])) from diverged
 
-    def _step(self, row: int) -> None:
+    def _complete(self, block: Trace) -> None:
+        """Fills the columns that are worked out for a whole block at once."""
+        block.tilt[:] = self._path.tilt(block.quat_WO)
+        # Where there is no contact its last place counts.
+        found = np.full(block.p_WC.shape, np.nan)
+        block.collisions[:] = self._plant.read_contacts(
+            block.p_WO, rotations(block.quat_WO), found, block.f_W
+        )
+        steps = np.arange(len(block))[:, None]
+        touched = ~np.isnan(found[..., 0])
+        last = np.maximum.accumulate(np.where(touched, steps, -1), axis=0)
+        known = found[last, np.arange(found.shape[1])]
+        block.p_WC[:] = np.where((last >= 0)[..., None], known, self._p_WC)
+        self._p_WC = block.p_WC[-1]
+
+    def _step(self, row: int, step: int) -> None:
         trace, plant = self.trace, self._plant
         measurement = plant.measure()
         self._write_state(row, measurement)
@@ -116,8 +131,7 @@ class ClosedLoop:
         trace.synthesis_s[row], trace.failed[row] = command.synthesis_s, command.failed
         plant.tips(trace.p_WE[row], trace.quat_WE[row], trace.twist_WE[row])
         plant.object_twist(trace.twist_WO[row])
-        trace.collisions[row] = plant.contacts(self._p_WC, trace.f_W[row])
-        trace.p_WC[row] = self._p_WC
+        plant.log_contacts(step)
 
     def _write_state(self, row: int, measurement: Measurement) -> None:
         trace = self.trace

@@ -7,18 +7,17 @@ from dataclasses import dataclass
 
 import mujoco
 import numpy as np
+from numpy.typing import NDArray
 
+from sim.contact_log import ContactLog, ContactReader
 from sim.scenario import Scenario
-from sim.scene import compose, tip_geom, tip_site, unwanted_pairs
+from sim.scene import compose, tip_site
 from synthesis.contact import Array
 
 with warnings.catch_warnings():  # dm_control looks for a display on import; none is needed
     warnings.simplefilter("ignore")
     from dm_control import mujoco as dm_mujoco
     from dm_control.mujoco import wrapper
-
-# A plant contact belongs to the environment contact point within this distance [m].
-_SAME_POINT = 0.01
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,7 +48,6 @@ class Plant:
     Attributes:
         physics: dm_control's Physics.
         joints: Names of the driven joints, in the order of the motors.
-        collisions: Pairs of geoms that touched against the scenario's will, and when first [s].
     """
 
     def __init__(self, scenario: Scenario) -> None:
@@ -66,25 +64,13 @@ class Plant:
         self._pose = slice(int(free.qposadr[0]), int(free.qposadr[0]) + 7)
         self._object = thing.id
         self._tips = [model.site(tip_site(hand)).id for hand in scenario.hands]
-        self._contact_of_pair = {
-            self._pair(tip_geom(hand), hand.geom): i for i, hand in enumerate(scenario.hands)
-        }
-        self._supports_of_pair: dict[tuple[int, int], list[int]] = {}
-        for i, support in enumerate(scenario.supports, start=len(scenario.hands)):
-            pair = self._pair(support.surface, support.geom)
-            self._supports_of_pair.setdefault(pair, []).append(i)
-        self._points_O = np.array([c.p_OC_O for c in scenario.hands] or np.zeros((0, 3)))
-        self._points_O = np.vstack(
-            [self._points_O.reshape(-1, 3), *(np.array([s.p_OP_O]) for s in scenario.supports)]
-        )
-        self._object_geoms = {model.geom(g.name).id for g in scenario.object.geoms}
-        self._unwanted = {self._pair(*pair) for pair in unwanted_pairs(scenario, model)}
-        self.collisions: dict[tuple[str, str], float] = {}
+        self._log, self._reader = ContactLog(), ContactReader(scenario, model)
         self._buffer = np.zeros(6)
 
-    def _pair(self, first: str, second: str) -> tuple[int, int]:
-        a, b = self._model.geom(first).id, self._model.geom(second).id
-        return (a, b) if a < b else (b, a)
+    @property
+    def collisions(self) -> dict[tuple[str, str], float]:
+        """Pairs of geoms that touched against the scenario's will, and when first [s]."""
+        return self._reader.collisions
 
     def reset(self, q: Array) -> None:
         """Puts the robot at rest at joint angles q, (l,), and the object at its start."""
@@ -114,8 +100,8 @@ class Plant:
         pose = data.qpos[self._pose]
         return Measurement(
             t=data.time,
-            q=data.qpos[self._q],
-            qd=data.qvel[self._qd],
+            q=data.qpos.take(self._q),
+            qd=data.qvel.take(self._qd),
             p_WO=pose[:3].copy(),
             quat_WO=pose[3:].copy(),
         )
@@ -136,48 +122,21 @@ class Plant:
         twist[:3], twist[3:] = self._buffer[3:], self._buffer[:3]
 
     def contacts(self, positions: Array, wrenches: Array) -> int:
-        """Adds up the plant's contacts at each of the scenario's contacts.
-
-        Args:
-            positions: Written with the contact points in the world [m], (m, 3); where there is no
-                contact it is left as it is.
-            wrenches: Written with force on the object in world axes [N] and torsional moment about
-                the normal into the object [N·m], (m, 4); zero where there is no contact.
-
-        Returns:
-            Number of contacts that the scenario does not want; see ``collisions``.
-        """
-        wrenches[:] = 0.0
-        collisions = 0
-        data = self._data
-        geoms, points, frames = data.contact.geom, data.contact.pos, data.contact.frame
-        for i, (first, second) in enumerate(geoms.tolist()):
-            pair = (first, second) if first < second else (second, first)
-            index = self._index(pair, points[i])
-            if index is None:
-                if pair in self._unwanted:
-                    collisions += 1
-                    names = (self._model.geom(first).name, self._model.geom(second).name)
-                    self.collisions.setdefault(names, data.time)
-                continue
-            mujoco.mj_contactForce(self._model, data, i, self._buffer)
-            # The contact frame's x axis points from the first geom to the second, and the force
-            # is the one on the second.
-            force = self._buffer[:3] @ frames[i].reshape(3, 3)
-            wrenches[index, :3] += force if second in self._object_geoms else -force
-            wrenches[index, 3] += self._buffer[3]
-            positions[index] = points[i]
-        return collisions
-
-    def _index(self, pair: tuple[int, int], position: Array) -> int | None:
-        """Which of the scenario's contacts a contact of a geom pair at a position is."""
-        if pair in self._contact_of_pair:
-            return self._contact_of_pair[pair]
-        candidates = self._supports_of_pair.get(pair)
-        if candidates is None:
-            return None
+        """The contacts of the last step, (m, 3) and (m, 4), as :meth:`read_contacts` has them."""
+        self._log.count = 0
+        self.log_contacts(0)
+        p_WO = self._data.xpos[self._object]
         R_WO = self._data.xmat[self._object].reshape(3, 3)
-        p_O = (position - self._data.xpos[self._object]) @ R_WO
-        distances = np.linalg.norm(self._points_O[candidates] - p_O, axis=1)
-        nearest = int(np.argmin(distances))
-        return candidates[nearest] if distances[nearest] < _SAME_POINT else None
+        return int(
+            self._reader.read(self._log, p_WO[None], R_WO[None], positions[None], wrenches[None])[0]
+        )
+
+    def log_contacts(self, step: int) -> None:
+        """Keeps the contacts of the last step, the one of an index in a block, to be read."""
+        self._log.append(step, self._model, self._data)
+
+    def read_contacts(self, p_WO: Array, R_WO: Array, positions: Array, wrenches: Array) -> NDArray:
+        """Reads the contacts of the block of steps that was logged; see :class:`ContactReader`."""
+        collisions = self._reader.read(self._log, p_WO, R_WO, positions, wrenches)
+        self._log.count = 0
+        return collisions

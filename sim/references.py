@@ -57,6 +57,4 @@ class References:
             )
         asked = self._path.schedule.at(t)
         q, slope = self._path.at(int(asked.phase), asked.progress)
-        return Target(
-            int(asked.phase), float(asked.tilt), float(asked.grip), q, slope * asked.rate
-        )
+        return Target(int(asked.phase), float(asked.tilt), float(asked.grip), q, slope * asked.rate)

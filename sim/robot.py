@@ -89,9 +89,7 @@ class RobotModel:
         for i, joint in enumerate(self._tip_joints):
             # The contact as a frame that the tip's joint carries along.
             X_JC = self._data.oMi[joint].actInv(pin.SE3(R_WC[i], p_WC[i]))
-            J = pin.getFrameJacobian(
-                self._model, self._data, joint, X_JC, pin.ReferenceFrame.LOCAL
-            )
+            J = pin.getFrameJacobian(self._model, self._data, joint, X_JC, pin.ReferenceFrame.LOCAL)
             J.take(self._order, axis=1, out=J_C[i], mode="clip")
         return J_C
 
