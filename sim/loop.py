@@ -19,7 +19,7 @@ from sim.trace import Trace
 from synthesis import FulcrumError
 
 # Steps per block that is handed on while the loop runs [s]; what an abrupt end may lose.
-_BLOCK_S = 0.1
+_BLOCK_S = 0.25
 
 
 class DivergedError(FulcrumError):

@@ -10,6 +10,7 @@ import rerun as rr
 
 from assets import description_path
 from assets.visuals import Visual, load_visuals
+from sim.recording.columns import poses
 from sim.scenario import Scenario
 from sim.scene import ObjectMotion, compose, hand_body
 from sim.trace import Trace
@@ -98,13 +99,7 @@ class Scenery:
             positions[:, k] = self._data.xpos[self._moving]
             quaternions[:, k] = self._data.xquat[self._moving]
         for body, position, quaternion in zip(self._moving, positions, quaternions, strict=True):
-            recording.send_columns(
-                self._path(body),
-                [time],
-                rr.Transform3D.columns(
-                    translation=position, quaternion=np.roll(quaternion, -1, axis=1)
-                ),
-            )
+            recording.send_columns(self._path(body), [time], poses(position, quaternion))
 
     def _path(self, body: int) -> str:
         return f"{WORLD}/{self._model.body(body).name}"
