@@ -106,7 +106,7 @@ class ClosedLoop:
         """Fills the columns that are worked out for a whole block at once."""
         block.tilt[:] = self._path.tilt(block.quat_WO)
         # Where there is no contact its last place counts.
-        found = np.full(block.p_WC.shape, np.nan)
+        found = np.full_like(block.p_WC, np.nan)
         block.collisions[:] = self._plant.read_contacts(
             block.p_WO, rotations(block.quat_WO), found, block.f_W
         )

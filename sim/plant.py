@@ -97,13 +97,13 @@ class Plant:
     def measure(self) -> Measurement:
         """The present state."""
         data = self._data
-        pose = data.qpos[self._pose]
+        pose = data.qpos[self._pose].copy()
         return Measurement(
             t=data.time,
             q=data.qpos.take(self._q),
             qd=data.qvel.take(self._qd),
-            p_WO=pose[:3].copy(),
-            quat_WO=pose[3:].copy(),
+            p_WO=pose[:3],
+            quat_WO=pose[3:],
         )
 
     def tips(self, positions: Array, quaternions: Array, twists: Array) -> None:

@@ -47,9 +47,12 @@ class RobotModel:
         self._order = np.array(
             [self._model.joints[self._model.getJointId(name)].idx_v for name in self.joints]
         )
-        self._order_2d = np.ix_(self._order, self._order)
-        self._lower = np.tril_indices(self._model.nv, -1)
+        # Where in Pinocchio's mass matrix, of which only the upper triangle counts, ours is.
+        first = np.minimum.outer(self._order, self._order)
+        second = np.maximum.outer(self._order, self._order)
+        self._mass_entries = first * self._model.nv + second
         self._q = np.zeros(self._model.nq)
+        self._tau_g = np.zeros(len(self.joints))
         tips = [self._frame(tip_site(hand)) for hand in scenario.hands]
         self._tip_joints = [int(self._model.frames[tip].parentJoint) for tip in tips]
 
@@ -63,17 +66,16 @@ class RobotModel:
         """Takes over joint angles [rad or m], (l,), for all quantities asked for next."""
         self._q[self._order] = q
         pin.computeJointJacobians(self._model, self._data, self._q)
+        g = pin.computeGeneralizedGravity(self._model, self._data, self._q)
+        self._tau_g = g.take(self._order)
 
     def gravity(self) -> Array:
         """Torque that holds the robot up against gravity [N·m or N], (l,)."""
-        g = pin.computeGeneralizedGravity(self._model, self._data, self._q)
-        return np.asarray(g)[self._order]
+        return self._tau_g
 
     def mass_matrix(self) -> Array:
         """Joint-space inertia [kg m^2 or kg], (l, l)."""
-        M = pin.crba(self._model, self._data, self._q)  # its upper triangle
-        M[self._lower] = M.T[self._lower]
-        return M[self._order_2d]
+        return pin.crba(self._model, self._data, self._q).take(self._mass_entries)
 
     def contact_jacobians(self, p_WC: Array, R_WC: Array) -> Array:
         """Jacobians of the hands' points at the contacts, in contact axes.
