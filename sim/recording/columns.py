@@ -24,11 +24,10 @@ def scalars(values: Array) -> list[rr.ComponentColumn]:
 
 
 def poses(positions: Array, quaternions: Array) -> list[rr.ComponentColumn]:
-    """Poses at k times: positions, (k, 3), and quaternions wxyz, (k, 4)."""
-    xyzw = np.roll(quaternions, -1, axis=1)
+    """Poses at k times: positions, (k, 3), and quaternions xyzw, (k, 4)."""
     return [
         rr.ComponentColumn(_TRANSLATION, components.Translation3DBatch(positions)),
-        rr.ComponentColumn(_QUATERNION, components.RotationQuatBatch(xyzw)),
+        rr.ComponentColumn(_QUATERNION, components.RotationQuatBatch(quaternions)),
     ]
 
 
