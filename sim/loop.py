@@ -7,7 +7,7 @@ from collections.abc import Iterator
 import numpy as np
 from dm_control.rl.control import PhysicsError
 
-from sim.contacts import ContactFrames, rotations
+from sim.contacts import ContactFrames
 from sim.controller import Controller
 from sim.ik import plan_joints
 from sim.path import ScrewPath
@@ -105,16 +105,13 @@ class ClosedLoop:
     def _complete(self, block: Trace) -> None:
         """Fills the columns that are worked out for a whole block at once."""
         block.tilt[:] = self._path.tilt(block.quat_WO)
+        self._plant.read(block)
         # Where there is no contact its last place counts.
-        found = np.full_like(block.p_WC, np.nan)
-        block.collisions[:] = self._plant.read_contacts(
-            block.p_WO, rotations(block.quat_WO), found, block.f_W
-        )
-        steps = np.arange(len(block))[:, None]
-        touched = ~np.isnan(found[..., 0])
-        last = np.maximum.accumulate(np.where(touched, steps, -1), axis=0)
-        known = found[last, np.arange(found.shape[1])]
-        block.p_WC[:] = np.where((last >= 0)[..., None], known, self._p_WC)
+        steps, contacts = np.arange(len(block)), np.arange(block.p_WC.shape[1])
+        touched = ~np.isnan(block.p_WC[..., 0])
+        last = np.maximum.accumulate(np.where(touched, steps[:, None], 0), axis=0)
+        block.p_WC[0] = np.where(touched[0, :, None], block.p_WC[0], self._p_WC)
+        block.p_WC[:] = block.p_WC[last, contacts]
         self._p_WC = block.p_WC[-1]
 
     def _step(self, row: int, step: int) -> None:
@@ -129,9 +126,7 @@ class ClosedLoop:
         trace.tau[row], trace.saturated[row] = command.tau, command.saturated
         trace.w_command_C[row] = command.w_OC_C
         trace.synthesis_s[row], trace.failed[row] = command.synthesis_s, command.failed
-        plant.tips(trace.p_WE[row], trace.quat_WE[row], trace.twist_WE[row])
-        plant.object_twist(trace.twist_WO[row])
-        plant.log_contacts(step)
+        plant.log(step)
 
     def _write_state(self, row: int, measurement: Measurement) -> None:
         trace = self.trace

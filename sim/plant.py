@@ -5,13 +5,14 @@ from __future__ import annotations
 import warnings
 from dataclasses import dataclass
 
-import mujoco
 import numpy as np
-from numpy.typing import NDArray
 
 from sim.contact_log import ContactLog, ContactReader
+from sim.contacts import rotations
+from sim.motion_log import MotionLog
 from sim.scenario import Scenario
-from sim.scene import compose, tip_site
+from sim.scene import compose
+from sim.trace import Trace
 from synthesis.contact import Array
 
 with warnings.catch_warnings():  # dm_control looks for a display on import; none is needed
@@ -43,7 +44,8 @@ class Plant:
     """Steps the scene and reads it by the scenario's names; the only module that steps MuJoCo.
 
     After :meth:`step` contact forces, tip and object poses belong to the state *before* the step,
-    for which they were computed; :meth:`measure` gives the state after it.
+    for which they were computed; :meth:`measure` gives the state after it. They are read at once,
+    or, many times cheaper, logged step by step and read for a whole block; not in turns.
 
     Attributes:
         physics: dm_control's Physics.
@@ -63,9 +65,8 @@ class Plant:
         free = model.joint(scenario.object.name)
         self._pose = slice(int(free.qposadr[0]), int(free.qposadr[0]) + 7)
         self._object = thing.id
-        self._tips = [model.site(tip_site(hand)).id for hand in scenario.hands]
-        self._log, self._reader = ContactLog(), ContactReader(scenario, model)
-        self._buffer = np.zeros(6)
+        self._contacts, self._reader = ContactLog(), ContactReader(scenario, model)
+        self._motion = MotionLog(scenario, model)
 
     @property
     def collisions(self) -> dict[tuple[str, str], float]:
@@ -108,35 +109,42 @@ class Plant:
 
     def tips(self, positions: Array, quaternions: Array, twists: Array) -> None:
         """Writes the hands' tip poses and world twists (linear first), (n, 3 | 4 | 6)."""
-        for i, site in enumerate(self._tips):
-            positions[i] = self._data.site_xpos[site]
-            mujoco.mju_mat2Quat(quaternions[i], self._data.site_xmat[site])
-            self._twist(mujoco.mjtObj.mjOBJ_SITE, site, twists[i])
+        self._motion.append(0, self._data)
+        self._motion.tips(positions[None], quaternions[None], twists[None])
 
     def object_twist(self, twist: Array) -> None:
         """Writes the world twist of the object frame, linear part first, (6,)."""
-        self._twist(mujoco.mjtObj.mjOBJ_XBODY, self._object, twist)
-
-    def _twist(self, kind: mujoco.mjtObj, index: int, twist: Array) -> None:
-        mujoco.mj_objectVelocity(self._model, self._data, kind, index, self._buffer, 0)
-        twist[:3], twist[3:] = self._buffer[3:], self._buffer[:3]
+        self._motion.append(0, self._data)
+        self._motion.object_twist(twist[None])
 
     def contacts(self, positions: Array, wrenches: Array) -> int:
-        """The contacts of the last step, (m, 3) and (m, 4), as :meth:`read_contacts` has them."""
-        self._log.count = 0
-        self.log_contacts(0)
-        p_WO = self._data.xpos[self._object]
-        R_WO = self._data.xmat[self._object].reshape(3, 3)
-        return int(
-            self._reader.read(self._log, p_WO[None], R_WO[None], positions[None], wrenches[None])[0]
+        """Adds up the plant's contacts; see :meth:`ContactReader.read`, here of one step."""
+        self._contacts.count = 0
+        self._contacts.append(0, self._model, self._data)
+        R_WO = self._data.xmat[self._object].reshape(1, 3, 3)
+        collisions = self._reader.read(
+            self._contacts,
+            self._data.xpos[self._object][None],
+            R_WO,
+            positions[None],
+            wrenches[None],
         )
+        return int(collisions[0])
 
-    def log_contacts(self, step: int) -> None:
-        """Keeps the contacts of the last step, the one of an index in a block, to be read."""
-        self._log.append(step, self._model, self._data)
+    def log(self, step: int) -> None:
+        """Keeps the last step, of an index in a block of steps, to be read with the block."""
+        self._contacts.append(step, self._model, self._data)
+        self._motion.append(step, self._data)
 
-    def read_contacts(self, p_WO: Array, R_WO: Array, positions: Array, wrenches: Array) -> NDArray:
-        """Reads the contacts of the block of steps that was logged; see :class:`ContactReader`."""
-        collisions = self._reader.read(self._log, p_WO, R_WO, positions, wrenches)
-        self._log.count = 0
-        return collisions
+    def read(self, block: Trace) -> None:
+        """Fills a block's columns on tips, contacts and the object's twist from what was logged.
+
+        Where a contact is not touched, its place becomes NaN.
+        """
+        self._motion.tips(block.p_WE, block.quat_WE, block.twist_WE)
+        self._motion.object_twist(block.twist_WO)
+        block.p_WC[:] = np.nan
+        block.collisions[:] = self._reader.read(
+            self._contacts, block.p_WO, rotations(block.quat_WO), block.p_WC, block.f_W
+        )
+        self._contacts.count = 0
