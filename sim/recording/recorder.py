@@ -83,6 +83,7 @@ class Recorder:
         self._scenery = Scenery(scenario, joints)
         self._scenery.log_shapes(self._recording)
         self._log_static(config, joints)
+        self._flush()  # what is logged waits for company; blocks of columns do not
 
     def _log_static(self, config: dict[str, Any], joints: tuple[str, ...]) -> None:
         text = f"```json\n{json.dumps(config, indent=2)}\n```"
@@ -174,12 +175,15 @@ class Recorder:
     def close(self, verdict: str) -> None:
         """Writes the verdict, as Markdown, and completes the file."""
         self._log_text("verdict", verdict)
+        self._flush()
+        self._recording.disconnect()
+
+    def _flush(self) -> None:
         try:
             self._recording.flush()
         except RuntimeError:  # somebody may close the viewer, but the file must be whole
             if not self._streamed:
                 raise
-        self._recording.disconnect()
 
 
 def colors(count: int) -> list[tuple[int, ...]]:
