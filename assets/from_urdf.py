@@ -20,7 +20,8 @@ from numpy.typing import NDArray
 from trimesh.intersections import slice_faces_plane
 
 from assets import DESCRIPTIONS, description_path
-from assets.visuals import UNPAINTED, pose_of, read_mesh, rgba_of, scale_of
+from assets.meshes import UNPAINTED, read_mesh
+from assets.visuals import pose_of, rgba_of, scale_of
 
 BAXTER = "baxter_description/urdf/baxter.urdf"
 GRIPPER_JOINTS = ("left_gripper_base_joint", "right_gripper_base_joint")

@@ -7,8 +7,6 @@ import pkgutil
 from functools import cache
 from typing import TYPE_CHECKING
 
-from synthesis.errors import InvalidInputError
-
 if TYPE_CHECKING:
     from sim.scenario import Scenario
 
@@ -31,5 +29,7 @@ def scenario(name: str) -> Scenario:
         InvalidInputError: There is none of that name.
     """
     if name not in scenarios():
+        from synthesis.errors import InvalidInputError
+
         raise InvalidInputError("scenario", repr(name), f"one of {', '.join(scenarios())}")
     return scenarios()[name]

@@ -25,7 +25,6 @@ from scenarios.common import (
     progress_bar,
 )
 from scenarios.paper.command import Reproduce
-from synthesis.errors import FulcrumError, InvalidInputError
 
 if TYPE_CHECKING:
     from sim.report import Report
@@ -111,6 +110,7 @@ class Run:
         from scenarios import scenario
         from sim.run import Request
         from sim.settings import stretched
+        from synthesis.errors import InvalidInputError
 
         chosen = scenario(self.scenario)
         control = chosen_control(chosen, self.controller, self.objective)
@@ -146,6 +146,7 @@ class Screenshot:
     def execute(self) -> int:
         """Does it; returns the exit code."""
         from sim.recording import recording_file, screenshot
+        from synthesis.errors import InvalidInputError
 
         picture = self.out or recording_file(self.run).parent / f"screenshot-{self.at:g}.png"
         if not picture.parent.is_dir():
@@ -192,12 +193,16 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """
     try:
         return _parse(arguments).execute()
-    except (FulcrumError, OSError) as error:
-        print(f"fulcrum: {' '.join(str(error).split())}", file=sys.stderr)
-        return BAD_INPUT
     except KeyboardInterrupt:  # a run that has begun catches it itself
         print("fulcrum: interrupted.", file=sys.stderr)
         return INTERRUPTED
+    except Exception as error:
+        from synthesis.errors import FulcrumError
+
+        if not isinstance(error, (FulcrumError, OSError)):
+            raise
+        print(f"fulcrum: {' '.join(str(error).split())}", file=sys.stderr)
+        return BAD_INPUT
 
 
 def _parse(
@@ -211,6 +216,8 @@ def _parse(
     except SystemExit as stop:
         if stop.code == 0:
             raise
+        from synthesis.errors import InvalidInputError
+
         boxed = re.split(r"─{5,}", errors.getvalue())
         words = re.sub(r"[│╭╮╰╯─\s]+", " ", boxed[1] if len(boxed) > 1 else errors.getvalue())
         raise InvalidInputError("command line", words.strip(), "as `fulcrum --help` says") from None

@@ -8,8 +8,6 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from synthesis.errors import InvalidInputError
-
 if TYPE_CHECKING:
     from sim.scenario import Scenario
     from sim.settings import Control
@@ -24,6 +22,7 @@ def chosen_control(scenario: Scenario, controller: str, objective: str | None) -
         InvalidInputError: There is no such controller or objective.
     """
     from sim.settings import controllers
+    from synthesis.errors import InvalidInputError
     from synthesis.problem import Objective
 
     known = controllers(scenario.control)
@@ -55,6 +54,8 @@ def progress_bar(name: str) -> Iterator[Callable[[int, int], None]]:
 def check_json(path: Path | None) -> None:
     """Raises InvalidInputError before the work is done if a JSON file could not be written."""
     if path is not None and (path.is_dir() or not path.parent.is_dir()):
+        from synthesis.errors import InvalidInputError
+
         raise InvalidInputError("--json", str(path), "a file in a folder that exists")
 
 
@@ -66,5 +67,7 @@ def new_folder(out: Path) -> Path:
     """
     nearest = next(path for path in (out, *out.absolute().parents) if path.exists())
     if not nearest.is_dir() or (out.exists() and any(out.iterdir())):
+        from synthesis.errors import InvalidInputError
+
         raise InvalidInputError("--out", str(out), "a new or empty folder")
     return out

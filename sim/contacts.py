@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 from sim.scenario import Friction, Scenario, Vector
 from sim.settings import Control
@@ -74,6 +75,12 @@ class ContactFrames:
     def points(self, R_WO: Array, p_WO: Array) -> Array:
         """Contact points in the world [m], (m, 3), for a pose of the object."""
         return p_WO + self.p_OC_O @ R_WO.T
+
+
+def rotations(quaternions: Array) -> Array:
+    """Rotation matrices, (..., 3, 3), of quaternions wxyz, (..., 4)."""
+    flat = Rotation.from_quat(quaternions.reshape(-1, 4), scalar_first=True).as_matrix()
+    return flat.reshape(*quaternions.shape[:-1], 3, 3)
 
 
 def _axes(normal: Vector, tangent: Vector) -> Array:

@@ -17,6 +17,7 @@ import numpy as np
 
 from sim.ik import JointPath
 from sim.plant import Measurement
+from sim.references import References
 from sim.robot import RobotModel
 from sim.scenario import Scenario
 from sim.settings import Control
@@ -70,7 +71,8 @@ class Controller:
     ) -> None:
         self._control = control
         self._robot = robot
-        self._path, self._schedule = joint_path, joint_path.schedule
+        self._references = References(joint_path, scenario.physics.timestep)
+        self._free = joint_path.schedule.free
         self._statics = Statics(scenario, control, robot)
         self._synthesizer = Synthesizer()
         self._tick = 0
@@ -81,29 +83,27 @@ class Controller:
 
     def command(self, measurement: Measurement) -> Command:
         """The torques for the next step."""
-        reference = self._schedule.at(measurement.t)
-        q_ref, slope = self._path.at(reference.phase, reference.progress)
-        qd_ref = slope * reference.rate
+        phase, tilt, grip, q_ref, qd_ref = self._references.at(measurement.t)
         synthesis_s, failed = 0.0, False
         if self._tick % self._control.solve_every == 0:
             self._update_model(measurement)
-            if not self._schedule.free[reference.phase]:
+            if not self._free[phase]:
                 started = time.perf_counter()
                 failed = not self._synthesize(measurement)
                 synthesis_s = time.perf_counter() - started
         self._tick += 1
-        share = reference.grip if self._control.feedforward else 0.0
+        share = grip if self._control.feedforward else 0.0
         tau = self._tau_g + share * self._tau_f + self._robot.damping * qd_ref
         omega = self._control.bandwidth
         acceleration = omega**2 * (q_ref - measurement.q) + 2.0 * omega * (qd_ref - measurement.qd)
         tau += self._mass_matrix @ acceleration
-        limited = np.clip(tau, self._robot.tau_min, self._robot.tau_max)
+        limited = np.minimum(np.maximum(tau, self._robot.tau_min), self._robot.tau_max)
         return Command(
             tau=limited,
             saturated=limited != tau,
             q_ref=q_ref,
-            phase=reference.phase,
-            tilt_ref=reference.tilt,
+            phase=phase,
+            tilt_ref=tilt,
             w_OC_C=share * self._w_OC_C,
             synthesis_s=synthesis_s,
             failed=failed,

@@ -79,8 +79,8 @@ class JointPath:
         """Where the manoeuvre starts, (l,)."""
         return self.q[0][0]
 
-    def at(self, phase: int, progress: float) -> tuple[Array, Array]:
-        """Angles, (l,), and their derivatives by the progress, (l,)."""
+    def at(self, phase: int, progress: Array | float) -> tuple[Array, Array]:
+        """Angles, (..., l), at progresses, (...), of a phase, and their derivatives by it."""
         spline = self._splines[phase]
         return spline(progress), spline(progress, 1)
 

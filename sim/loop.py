@@ -19,7 +19,7 @@ from sim.trace import Trace
 from synthesis import FulcrumError
 
 # Steps per block that is handed on while the loop runs [s]; what an abrupt end may lose.
-_BLOCK_S = 0.1
+_BLOCK_S = 0.25
 
 
 class DivergedError(FulcrumError):
@@ -90,19 +90,31 @@ class ClosedLoop:
             diverged: PhysicsError | None = None
             for row in range(start, stop):
                 try:
-                    self._step(row)
+                    self._step(row, row - start)
                 except PhysicsError as error:
                     diverged = error
                     break
                 self.steps = row + 1
             block = self.trace.rows(start, self.steps)
             if len(block):
-                block.tilt[:] = self._path.tilt(block.quat_WO)
+                self._complete(block)
                 yield block
             if diverged is not None:
                 raise DivergedError(float(self.trace.t[self.steps])) from diverged
 
-    def _step(self, row: int) -> None:
+    def _complete(self, block: Trace) -> None:
+        """Fills the columns that are worked out for a whole block at once."""
+        block.tilt[:] = self._path.tilt(block.quat_WO)
+        self._plant.read(block)
+        # Where there is no contact its last place counts.
+        steps, contacts = np.arange(len(block)), np.arange(block.p_WC.shape[1])
+        touched = ~np.isnan(block.p_WC[..., 0])
+        last = np.maximum.accumulate(np.where(touched, steps[:, None], 0), axis=0)
+        block.p_WC[0] = np.where(touched[0, :, None], block.p_WC[0], self._p_WC)
+        block.p_WC[:] = block.p_WC[last, contacts]
+        self._p_WC = block.p_WC[-1]
+
+    def _step(self, row: int, step: int) -> None:
         trace, plant = self.trace, self._plant
         measurement = plant.measure()
         self._write_state(row, measurement)
@@ -114,10 +126,7 @@ class ClosedLoop:
         trace.tau[row], trace.saturated[row] = command.tau, command.saturated
         trace.w_command_C[row] = command.w_OC_C
         trace.synthesis_s[row], trace.failed[row] = command.synthesis_s, command.failed
-        plant.tips(trace.p_WE[row], trace.quat_WE[row], trace.twist_WE[row])
-        plant.object_twist(trace.twist_WO[row])
-        trace.collisions[row] = plant.contacts(self._p_WC, trace.f_W[row])
-        trace.p_WC[row] = self._p_WC
+        plant.log(step)
 
     def _write_state(self, row: int, measurement: Measurement) -> None:
         trace = self.trace

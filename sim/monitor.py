@@ -5,9 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass, fields
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
-from sim.contacts import ContactFrames, true_contacts
+from sim.contacts import ContactFrames, rotations, true_contacts
 from sim.scenario import Scenario
 from sim.schedule import Schedule
 from sim.trace import Trace
@@ -62,7 +61,7 @@ class Monitor:
 
     def update(self, block: Trace) -> ContactHistory:
         """Contact quantities of the next rows of the run."""
-        R_WO = _rotations(block.quat_WO)
+        R_WO = rotations(block.quat_WO)
         R_WC = self._frames.in_world(R_WO)
         w_OC_C = np.zeros((len(block), len(self._contacts), 6))
         w_OC_C[..., :3] = np.einsum("kmji,kmj->kmi", R_WC, block.f_W[..., :3])
@@ -86,7 +85,7 @@ class Monitor:
         slip = np.zeros(block.p_WC.shape[:2])
         if not held.any():
             return slip
-        R_WE = _rotations(block.quat_WE)
+        R_WE = rotations(block.quat_WE)
         if self._marks is None:
             first = int(np.argmax(held))
             p_WC = block.p_WC[first]
@@ -119,12 +118,6 @@ class Monitor:
         spin = self._spin + np.cumsum(np.sum(turn * normal, axis=-1) * live, axis=0)
         self._slide, self._spin = slide[-1], spin[-1]
         return slide, spin
-
-
-def _rotations(quaternions: Array) -> Array:
-    """Rotation matrices, (..., 3, 3), of quaternions wxyz, (..., 4)."""
-    flat = Rotation.from_quat(quaternions.reshape(-1, 4), scalar_first=True).as_matrix()
-    return flat.reshape(*quaternions.shape[:-1], 3, 3)
 
 
 def _tangential(vectors: Array, normal: Array) -> Array:

@@ -72,4 +72,5 @@ def minimum_jerk(x: Array | float) -> tuple[Array, Array]:
     Source: Flash and Hogan 1985, the polynomial 10 x^3 - 15 x^4 + 6 x^5.
     """
     x = np.clip(x, 0.0, 1.0)
-    return x**3 * (10.0 + x * (6.0 * x - 15.0)), 30.0 * x**2 * (1.0 - x) ** 2
+    rest = x * (1.0 - x)
+    return x * x * x * (10.0 + x * (6.0 * x - 15.0)), 30.0 * rest * rest

@@ -47,8 +47,14 @@ class RobotModel:
         self._order = np.array(
             [self._model.joints[self._model.getJointId(name)].idx_v for name in self.joints]
         )
+        # Where in Pinocchio's mass matrix, of which only the upper triangle counts, ours is.
+        first = np.minimum.outer(self._order, self._order)
+        second = np.maximum.outer(self._order, self._order)
+        self._mass_entries = first * self._model.nv + second
         self._q = np.zeros(self._model.nq)
-        self._tips = [self._frame(tip_site(hand)) for hand in scenario.hands]
+        self._tau_g = np.zeros(len(self.joints))
+        tips = [self._frame(tip_site(hand)) for hand in scenario.hands]
+        self._tip_joints = [int(self._model.frames[tip].parentJoint) for tip in tips]
 
     def _frame(self, name: str) -> int:
         if not self._model.existFrame(name):
@@ -60,18 +66,16 @@ class RobotModel:
         """Takes over joint angles [rad or m], (l,), for all quantities asked for next."""
         self._q[self._order] = q
         pin.computeJointJacobians(self._model, self._data, self._q)
-        pin.updateFramePlacements(self._model, self._data)
+        g = pin.computeGeneralizedGravity(self._model, self._data, self._q)
+        self._tau_g = g.take(self._order)
 
     def gravity(self) -> Array:
         """Torque that holds the robot up against gravity [N·m or N], (l,)."""
-        g = pin.computeGeneralizedGravity(self._model, self._data, self._q)
-        return np.asarray(g)[self._order]
+        return self._tau_g
 
     def mass_matrix(self) -> Array:
         """Joint-space inertia [kg m^2 or kg], (l, l)."""
-        M = np.triu(pin.crba(self._model, self._data, self._q))
-        M = M + np.triu(M, 1).T
-        return M[np.ix_(self._order, self._order)]
+        return pin.crba(self._model, self._data, self._q).take(self._mass_entries)
 
     def contact_jacobians(self, p_WC: Array, R_WC: Array) -> Array:
         """Jacobians of the hands' points at the contacts, in contact axes.
@@ -83,18 +87,13 @@ class RobotModel:
         Returns:
             (n, 6, l): twist, linear part first, of the point of each hand that is at its contact.
         """
-        J_WE = np.empty((len(self._tips), 6, len(self.joints)))
-        p_WE = np.empty((len(self._tips), 3))
-        for i, tip in enumerate(self._tips):
-            J_WE[i] = pin.getFrameJacobian(
-                self._model, self._data, tip, pin.ReferenceFrame.LOCAL_WORLD_ALIGNED
-            )[:, self._order]
-            p_WE[i] = self._data.oMf[tip].translation
-        linear, angular = J_WE[:, :3], J_WE[:, 3:]
-        offset = (p_WC - p_WE)[:, :, None]
-        R_CW = R_WC.transpose(0, 2, 1)
-        linear = linear + np.cross(angular, offset, axis=1)
-        return np.concatenate([R_CW @ linear, R_CW @ angular], axis=1)
+        J_C = np.empty((len(self._tip_joints), 6, len(self.joints)))
+        for i, joint in enumerate(self._tip_joints):
+            # The contact as a frame that the tip's joint carries along.
+            X_JC = self._data.oMi[joint].actInv(pin.SE3(R_WC[i], p_WC[i]))
+            J = pin.getFrameJacobian(self._model, self._data, joint, X_JC, pin.ReferenceFrame.LOCAL)
+            J.take(self._order, axis=1, out=J_C[i], mode="clip")
+        return J_C
 
     def statics(self, p_WC: Array, R_WC: Array) -> Joints:
         """The joints' part of the synthesis problem at the last updated angles."""

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from bisect import bisect_right
 from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
+from numpy.typing import NDArray
 
 from sim.path import minimum_jerk
 from sim.scenario import Scenario
@@ -16,7 +16,7 @@ from synthesis.contact import Array, Mask
 
 @dataclass(frozen=True)
 class Reference:
-    """What is asked for at one instant.
+    """What is asked for at an instant, or at many: numbers, or arrays over the instants.
 
     Attributes:
         phase: Index of the phase.
@@ -26,11 +26,11 @@ class Reference:
         grip: Share of the synthesised forces [-].
     """
 
-    phase: int
-    progress: float
-    rate: float
-    tilt: float
-    grip: float
+    phase: NDArray[np.intp]
+    progress: Array
+    rate: Array
+    tilt: Array
+    grip: Array
 
 
 class Schedule:
@@ -49,7 +49,9 @@ class Schedule:
         self.starts = self.ends - [phase.duration_s for phase in self.phases]
         start = Phase("start", 1.0, tilt=0.0, gap=scenario.standoff, grip=0.0)
         self._before = (start, *self.phases[:-1])
-        self._ends = self.ends.tolist()
+        self._durations = np.array([phase.duration_s for phase in self.phases])
+        self._shares_before = np.array([[phase.tilt, phase.grip] for phase in self._before])
+        self._changes = [[p.tilt, p.grip] for p in self.phases] - self._shares_before
 
     @property
     def total_s(self) -> float:
@@ -60,17 +62,17 @@ class Schedule:
         """The phase before, whose end is this one's start."""
         return self._before[phase]
 
-    def at(self, t: float) -> Reference:
-        """What is asked for at time t [s]; after the end, what the last phase ended with."""
-        index = min(bisect_right(self._ends, t), len(self.phases) - 1)
-        phase, before = self.phases[index], self._before[index]
-        progress, rate = minimum_jerk((t - self.starts[index]) / phase.duration_s)
+    def at(self, t: Array | float) -> Reference:
+        """What is asked for at times t [s]; after the end, what the last phase ended with."""
+        index = np.minimum(np.searchsorted(self.ends, t, side="right"), len(self.phases) - 1)
+        progress, rate = minimum_jerk((t - self.starts[index]) / self._durations[index])
+        share = self._shares_before[index] + self._changes[index] * np.expand_dims(progress, -1)
         return Reference(
             phase=index,
-            progress=float(progress),
-            rate=float(rate) / phase.duration_s,
-            tilt=self.end * (before.tilt + (phase.tilt - before.tilt) * float(progress)),
-            grip=before.grip + (phase.grip - before.grip) * float(progress),
+            progress=progress,
+            rate=rate / self._durations[index],
+            tilt=self.end * share[..., 0],
+            grip=share[..., 1],
         )
 
     def times(self, phase: int, progress: Array) -> Array:

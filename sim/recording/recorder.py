@@ -14,6 +14,7 @@ from rerun.components import AggregationPolicy
 from sim.contacts import true_contacts
 from sim.monitor import ContactHistory
 from sim.recording.blueprint import TIMELINE, blueprint
+from sim.recording.columns import arrows, frames, scalars
 from sim.recording.scenery import Scenery
 from sim.scenario import Scenario
 from sim.trace import Trace
@@ -32,8 +33,10 @@ class _Arrow(NamedTuple):
 
 
 # The commanded arrow is the thin core of the measured one, and shows where they disagree.
-_MEASURED = _Arrow((220, 30, 30), 0.006)
-_COMMANDED = _Arrow((40, 110, 250), 0.002)
+_LOOKS = {
+    "measured": _Arrow((220, 30, 30), 0.006),
+    "commanded": _Arrow((40, 110, 250), 0.002),
+}
 
 
 class Recorder:
@@ -80,6 +83,7 @@ class Recorder:
         self._scenery = Scenery(scenario, joints)
         self._scenery.log_shapes(self._recording)
         self._log_static(config, joints)
+        self._flush()  # what is logged waits for company; blocks of columns do not
 
     def _log_static(self, config: dict[str, Any], joints: tuple[str, ...]) -> None:
         text = f"```json\n{json.dumps(config, indent=2)}\n```"
@@ -105,6 +109,9 @@ class Recorder:
             self._recording.log(f"plots/{path}", lines, static=True)
         for contact in self._contacts:
             self._recording.log(f"cones/{contact.name}", _cone(contact.mu), static=True)
+            for kind, look in _LOOKS.items():
+                arrow = rr.Arrows3D.from_fields(colors=[look.color], radii=[look.radius])
+                self._recording.log(f"forces/{kind}/{contact.name}", arrow, static=True)
 
     def _log_text(self, path: str, text: str) -> None:
         document = rr.TextDocument(text, media_type=rr.MediaType.MARKDOWN)
@@ -131,9 +138,7 @@ class Recorder:
         self._send_scene(block, history)
 
     def _send(self, path: str, time: rr.TimeColumn, values: Array) -> None:
-        rows, series = values.shape
-        columns = rr.Scalars.columns(scalars=values.ravel()).partition([series] * rows)
-        self._recording.send_columns(f"plots/{path}", [time], columns)
+        self._recording.send_columns(f"plots/{path}", [time], scalars(values))
 
     def _send_phases(self, block: Trace) -> None:
         """Marks the rows at which a phase begins."""
@@ -157,36 +162,28 @@ class Recorder:
         commanded = np.einsum("kmij,kmj->kmi", R_WC, rows.w_command_C[..., :3])
         for i, contact in enumerate(self._contacts):
             origins = rows.p_WC[:, i]
-            self._send_arrows(
-                f"measured/{contact.name}", time, origins, rows.f_W[:, i, :3], _MEASURED
+            for kind, forces in (("measured", rows.f_W[:, i, :3]), ("commanded", commanded[:, i])):
+                self._recording.send_columns(
+                    f"forces/{kind}/{contact.name}",
+                    [time],
+                    arrows(origins, _METERS_PER_NEWTON * forces),
+                )
+            self._recording.send_columns(
+                f"cones/{contact.name}", [time], frames(origins, R_WC[:, i])
             )
-            self._send_arrows(
-                f"commanded/{contact.name}", time, origins, commanded[:, i], _COMMANDED
-            )
-            columns = rr.Transform3D.columns(translation=rows.p_WC[:, i], mat3x3=R_WC[:, i])
-            self._recording.send_columns(f"cones/{contact.name}", [time], columns)
-
-    def _send_arrows(
-        self, path: str, time: rr.TimeColumn, origins: Array, forces: Array, look: _Arrow
-    ) -> None:
-        vectors = _METERS_PER_NEWTON * forces
-        columns = rr.Arrows3D.columns(
-            vectors=vectors,
-            origins=origins,
-            colors=[look.color] * len(origins),
-            radii=[look.radius] * len(origins),
-        )
-        self._recording.send_columns(f"forces/{path}", [time], columns)
 
     def close(self, verdict: str) -> None:
         """Writes the verdict, as Markdown, and completes the file."""
         self._log_text("verdict", verdict)
+        self._flush()
+        self._recording.disconnect()
+
+    def _flush(self) -> None:
         try:
             self._recording.flush()
         except RuntimeError:  # somebody may close the viewer, but the file must be whole
             if not self._streamed:
                 raise
-        self._recording.disconnect()
 
 
 def colors(count: int) -> list[tuple[int, ...]]:

@@ -10,6 +10,7 @@ import rerun as rr
 
 from assets import description_path
 from assets.visuals import Visual, load_visuals
+from sim.recording.columns import poses
 from sim.scenario import Scenario
 from sim.scene import ObjectMotion, compose, hand_body
 from sim.trace import Trace
@@ -35,6 +36,7 @@ class Scenery:
         bodies = np.array(sorted(shown))
         moves = (self._model.body_weldid[bodies] != 0) | (self._model.body_mocapid[bodies] >= 0)
         self._moving, self._fixed = bodies[moves], bodies[~moves]
+        self._paths = [self._path(body) for body in self._moving]
 
     def _load_visuals(self) -> list[Visual]:
         if self._scenario.robot.description is None:
@@ -97,14 +99,9 @@ class Scenery:
             mujoco.mj_kinematics(self._model, self._data)
             positions[:, k] = self._data.xpos[self._moving]
             quaternions[:, k] = self._data.xquat[self._moving]
-        for body, position, quaternion in zip(self._moving, positions, quaternions, strict=True):
-            recording.send_columns(
-                self._path(body),
-                [time],
-                rr.Transform3D.columns(
-                    translation=position, quaternion=np.roll(quaternion, -1, axis=1)
-                ),
-            )
+        xyzw = np.roll(quaternions, -1, axis=2)
+        for path, position, quaternion in zip(self._paths, positions, xyzw, strict=True):
+            recording.send_columns(path, [time], poses(position, quaternion))
 
     def _path(self, body: int) -> str:
         return f"{WORLD}/{self._model.body(body).name}"

@@ -1,0 +1,138 @@
+"""The plant's contacts: kept step by step as MuJoCo has them, told apart for many steps at once."""
+
+from __future__ import annotations
+
+import mujoco
+import numpy as np
+from numpy.typing import NDArray
+
+from sim.scenario import Scenario
+from sim.scene import tip_geom, unwanted_pairs
+from synthesis.contact import Array
+
+# A plant contact belongs to the environment contact point within this distance [m].
+_SAME_POINT = 0.01
+# Contacts that there is room for at first.
+_ROOM = 1024
+
+
+class ContactLog:
+    """MuJoCo's contacts of consecutive steps, one row per contact.
+
+    Attributes:
+        count: How many there are; rows from there on do not count.
+        step: Index of the step, (k,).
+        t: Time after the step [s], (k,).
+        geoms: The two geoms, (k, 2).
+        point: In the world [m], (k, 3).
+        frame: Contact axes row by row, first the normal from the first geom to the second, (k, 9).
+        wrench: On the second geom in these axes, force first [N, N·m], (k, 6).
+    """
+
+    def __init__(self) -> None:
+        self.count = 0
+        self.step, self.t = np.zeros(_ROOM, np.intp), np.zeros(_ROOM)
+        self.geoms, self.point = np.zeros((_ROOM, 2), np.intp), np.zeros((_ROOM, 3))
+        self.frame, self.wrench = np.zeros((_ROOM, 9)), np.zeros((_ROOM, 6))
+
+    def append(self, step: int, model: mujoco.MjModel, data: mujoco.MjData) -> None:
+        """Keeps the contacts of the step that was just made."""
+        first, last = self.count, self.count + data.ncon
+        while last > len(self.step):
+            self._grow()
+        contacts = data.contact
+        self.step[first:last], self.t[first:last] = step, data.time
+        self.geoms[first:last], self.point[first:last] = contacts.geom, contacts.pos
+        self.frame[first:last] = contacts.frame
+        for i in range(data.ncon):
+            mujoco.mj_contactForce(model, data, i, self.wrench[first + i])
+        self.count = last
+
+    def _grow(self) -> None:
+        for name in ("step", "t", "geoms", "point", "frame", "wrench"):
+            array = getattr(self, name)
+            setattr(self, name, np.concatenate([array, np.zeros_like(array)]))
+
+
+class ContactReader:
+    """Finds the scenario's contacts among MuJoCo's, by their geoms and places.
+
+    Attributes:
+        collisions: Pairs of geoms that touched against the scenario's will, and when first [s].
+    """
+
+    def __init__(self, scenario: Scenario, model: mujoco.MjModel) -> None:
+        self.collisions: dict[tuple[str, str], float] = {}
+        self._geoms = [model.geom(g).name for g in range(model.ngeom)]
+        self._is_object = np.isin(self._geoms, [g.name for g in scenario.object.geoms])
+        self._unwanted = np.zeros((model.ngeom, model.ngeom), bool)
+        for first, second in unwanted_pairs(scenario, model):
+            self._set(self._unwanted, first, second, True)
+        # Which hand's contact a pair of geoms is; -1 for none.
+        self._hand = np.full((model.ngeom, model.ngeom), -1)
+        for i, hand in enumerate(scenario.hands):
+            self._set(self._hand, tip_geom(hand), hand.geom, i)
+        self._hands = len(scenario.hands)
+        self._supports: dict[tuple[str, str], list[int]] = {}
+        for i, support in enumerate(scenario.supports):
+            self._supports.setdefault((support.surface, support.geom), []).append(i)
+        self._points_O = np.array([support.p_OP_O for support in scenario.supports])
+
+    def _set(self, table: NDArray, first: str, second: str, value: int) -> None:
+        a, b = self._geoms.index(first), self._geoms.index(second)
+        table[a, b] = table[b, a] = value
+
+    def read(
+        self, log: ContactLog, p_WO: Array, R_WO: Array, positions: Array, wrenches: Array
+    ) -> NDArray[np.intp]:
+        """Adds up the plant's contacts of s steps at each of the scenario's m contacts.
+
+        Args:
+            log: The plant's contacts; steps count from 0.
+            p_WO: Positions of the object [m], (s, 3).
+            R_WO: Orientations of the object, (s, 3, 3).
+            positions: Written with the contact points in the world [m], (s, m, 3); where there is
+                no contact it is left as it is.
+            wrenches: Written with forces on the object in world axes [N] and torsional moments
+                about the normal into the object [N·m], (s, m, 4); zero where there is no contact.
+
+        Returns:
+            Number of contacts that the scenario does not want, (s,); see ``collisions``.
+        """
+        rows = slice(0, log.count)
+        step, geoms, point = log.step[rows], log.geoms[rows], log.point[rows]
+        contact = self._contact(step, geoms, point, p_WO, R_WO)
+        ours = contact >= 0
+        where = step[ours], contact[ours]
+        axes, wrench = log.frame[rows][ours].reshape(-1, 3, 3), log.wrench[rows][ours]
+        # The wrench is the one on the second geom.
+        sign = np.where(self._is_object[geoms[ours, 1]], 1.0, -1.0)
+        force = sign[:, None] * np.einsum("ki,kij->kj", wrench[:, :3], axes)
+        wrenches[:] = 0.0
+        np.add.at(wrenches, where, np.column_stack([force, wrench[:, 3]]))
+        positions[where] = point[ours]
+        return self._count_collisions(step, geoms, log.t[rows], len(p_WO))
+
+    def _contact(
+        self, step: NDArray, geoms: NDArray, point: Array, p_WO: Array, R_WO: Array
+    ) -> NDArray[np.intp]:
+        """Which of the scenario's contacts each of the plant's is; -1 for none."""
+        contact = self._hand[geoms[:, 0], geoms[:, 1]]
+        for pair, supports in self._supports.items():
+            a, b = map(self._geoms.index, pair)
+            here = np.flatnonzero(((geoms == (a, b)) | (geoms == (b, a))).all(axis=1))
+            p_OC_W = point[here] - p_WO[step[here]]
+            p_OC_O = np.einsum("ki,kij->kj", p_OC_W, R_WO[step[here]])
+            distances = np.linalg.norm(self._points_O[supports] - p_OC_O[:, None], axis=2)
+            nearest = np.argmin(distances, axis=1)
+            near = distances.min(axis=1) < _SAME_POINT
+            contact[here[near]] = self._hands + np.array(supports)[nearest[near]]
+        return contact
+
+    def _count_collisions(
+        self, step: NDArray, geoms: NDArray, t: Array, steps: int
+    ) -> NDArray[np.intp]:
+        unwanted = self._unwanted[geoms[:, 0], geoms[:, 1]]
+        for (first, second), when in zip(geoms[unwanted].tolist(), t[unwanted], strict=True):
+            self.collisions.setdefault((self._geoms[first], self._geoms[second]), float(when))
+        return np.bincount(step[unwanted], minlength=steps)
