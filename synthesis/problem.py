@@ -2,17 +2,19 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from enum import StrEnum
 from functools import cached_property
 
 import numpy as np
 
-from synthesis.contact import Array, Contact, ContactModel, Role, grasp_maps
+from synthesis.contact import Array, Contact, ContactModel, ContactSet, check_names, grasp_maps
 from synthesis.errors import InvalidInputError
 
 # Rotation matrices come from integrated quaternions: 1e-6 passes those, and nothing mis-scaled.
 _ROTATION_TOLERANCE = 1e-6
+_IDENTITY = np.eye(3)
 
 
 class Objective(StrEnum):
@@ -66,7 +68,7 @@ class Joints:
     tau_max: Array
 
     def __post_init__(self) -> None:
-        _check_names("joints.names", self.names)
+        check_names("joints.names", self.names)
         joints = len(self.names)
         if self.J_C.ndim != 3 or self.J_C.shape[1:] != (6, joints):
             raise InvalidInputError("joints.J_C", f"shape {self.J_C.shape}", f"(n, 6, {joints})")
@@ -74,10 +76,13 @@ class Joints:
             _check_shape(f"joints.{field}", getattr(self, field), (joints,))
         for field in ("J_C", "tau_g"):
             _check_finite(f"joints.{field}", getattr(self, field))
-        ordered = (
-            (self.tau_min <= self.tau_max) & (self.tau_min < np.inf) & (self.tau_max > -np.inf)
-        )
-        if not ordered.all():
+        if not (
+            (self.tau_min <= self.tau_max).all()
+            and self.tau_min.max() < np.inf
+            and self.tau_max.min() > -np.inf
+        ):
+            ordered = self.tau_min <= self.tau_max
+            ordered &= (self.tau_min < np.inf) & (self.tau_max > -np.inf)
             worst = int(np.argmin(ordered))
             raise InvalidInputError(
                 f"joints.tau_min[{self.names[worst]}]",
@@ -120,7 +125,7 @@ class Problem:
 
     def __post_init__(self) -> None:
         m = len(self.contacts)
-        _check_names("contacts", tuple(c.name for c in self.contacts))
+        self.contact_set  # noqa: B018 - made here, it checks the names
         _check_shape("R_OC", self.R_OC, (m, 3, 3))
         _check_shape("p_OC_O", self.p_OC_O, (m, 3))
         _check_shape("w_ext_O", self.w_ext_O, (6,))
@@ -129,8 +134,9 @@ class Problem:
         self._check_rotations()
         if not self.hands and self.objective is not Objective.FRICTION_MARGIN:
             raise InvalidInputError("contacts", "no hand", f"a hand, as {self.objective} asks")
-        frictionless = all(c.model is ContactModel.FRICTIONLESS for c in self.contacts)
-        if frictionless and self.objective is Objective.FRICTION_MARGIN:
+        if self.objective is Objective.FRICTION_MARGIN and all(
+            c.model is ContactModel.FRICTIONLESS for c in self.contacts
+        ):
             raise InvalidInputError(
                 "contacts", "no friction", f"friction, as {self.objective} asks"
             )
@@ -140,9 +146,10 @@ class Problem:
             self._check_joints(self.joints)
 
     def _check_rotations(self) -> None:
-        deviation = np.abs(self.R_OC @ self.R_OC.transpose(0, 2, 1) - np.eye(3)).max(axis=(1, 2))
-        proper = (deviation <= _ROTATION_TOLERANCE) & (np.linalg.det(self.R_OC) > 0.0)
-        if not proper.all():
+        deviation = np.abs(self.R_OC @ self.R_OC.transpose(0, 2, 1) - _IDENTITY)
+        determinant = np.linalg.det(self.R_OC)
+        if not (deviation.max() <= _ROTATION_TOLERANCE and determinant.min() > 0.0):
+            proper = (deviation.max(axis=(1, 2)) <= _ROTATION_TOLERANCE) & (determinant > 0.0)
             worst = self.contacts[int(np.argmin(proper))].name
             raise InvalidInputError(
                 f"R_OC[{worst}]", "a matrix that is no rotation", "orthonormal with determinant +1"
@@ -167,28 +174,34 @@ class Problem:
                 )
 
     @cached_property
+    def contact_set(self) -> ContactSet:
+        """What follows from the contacts alone, as arrays."""
+        return ContactSet.of(self.contacts)
+
+    @property
     def hands(self) -> tuple[int, ...]:
         """Indices of the hand contacts, in the order of the Jacobians."""
-        return tuple(i for i, c in enumerate(self.contacts) if c.role is Role.HAND)
+        return self.contact_set.hands
 
     @cached_property
     def G(self) -> Array:
         """Grasp maps of all contacts, (m, 6, 6)."""
         return grasp_maps(self.R_OC, self.p_OC_O)
 
+    @cached_property
+    def load(self) -> float:
+        """The largest load: external wrench, preload and, if torque counts, gravity [N or N·m]."""
+        load = max(float(np.abs(self.w_ext_O).max()), self.contact_set.preload)
+        if self.joints is not None and self.objective.needs_joints:
+            load = max(load, float(np.abs(self.joints.tau_g).max()))
+        return load
+
     def torque(self, w_OC_C: Array) -> Array:
         """Joint torques [N·m or N], (l,), that go with contact wrenches, (m, 6): (15)."""
         if self.joints is None:
             return np.zeros(0)
-        return np.einsum("nkl,nk->l", self.joints.J_C, w_OC_C[list(self.hands)]) + self.joints.tau_g
-
-
-def _check_names(field: str, names: tuple[str, ...]) -> None:
-    if not names:
-        raise InvalidInputError(field, "an empty set", "at least one")
-    repeated = sorted({name for name in names if names.count(name) > 1})
-    if repeated:
-        raise InvalidInputError(field, f"{', '.join(repeated)} more than once", "unique names")
+        J = self.joints.J_C.reshape(-1, len(self.joints.names))
+        return w_OC_C[self.contact_set.hand_rows].ravel() @ J + self.joints.tau_g
 
 
 def _check_shape(field: str, array: Array, shape: tuple[int, ...]) -> None:
@@ -197,5 +210,6 @@ def _check_shape(field: str, array: Array, shape: tuple[int, ...]) -> None:
 
 
 def _check_finite(field: str, array: Array) -> None:
-    if not np.isfinite(array).all():
+    # A finite sum of squares proves it at once; where it is not, numbers may be merely large.
+    if not math.isfinite(np.vdot(array, array)) and not np.isfinite(array).all():
         raise InvalidInputError(field, "a value that is NaN or infinite", "finite numbers")

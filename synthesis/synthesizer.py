@@ -16,7 +16,8 @@ keeps it within the cone at s without letting it hold the others back.
 
 from __future__ import annotations
 
-from collections.abc import Hashable
+import time
+from collections.abc import Callable, Hashable
 from dataclasses import dataclass, replace
 
 import clarabel
@@ -28,7 +29,7 @@ from synthesis.conic import ConicForm, structure
 from synthesis.contact import Array, ContactModel, N
 from synthesis.errors import InfeasibleError, SolverError, UnboundedError
 from synthesis.problem import Objective, Problem
-from synthesis.solution import Solution, certificate
+from synthesis.solution import Multipliers, Solution, certificate
 
 # Feasibility and gap, relative: well under the 1e-6 to which the torque matters. On degenerate
 # problems the linear algebra stalls a little above the first; the second is accepted, too.
@@ -43,6 +44,13 @@ _PROVEN = ("PrimalInfeasible", "DualInfeasible")
 _FALLBACK_REGULARISATIONS = (1e-12, 1e-6)
 # The solver's feasibility is relative to its largest number, which may be an absurd bound.
 _WORST_IMBALANCE = 1e-6
+# What an attempt must keep, where there is a second chance.
+_IMBALANCE = 1e-8
+# An attempt's proof of infeasibility must hold for forces up to this many times the load [-].
+_FARTHEST = 1e4
+# After an attempt that failed, so many problems of the structure are solved with all rows at once:
+# torque limits that bind at one tick bind at the next, and a futile attempt costs a third again.
+_REST = 16
 # Normal forces below this fraction of the largest force count as none: their cones are noise.
 _LOADED = 1e-6
 
@@ -72,7 +80,8 @@ class Synthesizer:
     """
 
     def __init__(self) -> None:
-        self._compiled: dict[Hashable, _Compiled] = {}
+        self._programs: dict[Hashable, _Program] = {}
+        self._rest: dict[Hashable, int] = {}
 
     def solve(self, problem: Problem) -> Solution:
         """Solves (17).
@@ -82,13 +91,28 @@ class Synthesizer:
             UnboundedError: The objective improves without limit.
             SolverError: The solver gave neither.
         """
-        key = structure(problem)
-        compiled = self._compiled.get(key)
-        if compiled is None:
-            compiled = self._compiled[key] = _Compiled(problem)
         if problem.objective is Objective.FRICTION_MARGIN:
-            return _largest_margin(compiled, problem)
-        return compiled.solve(problem)
+            return _largest_margin(self._solve, problem)
+        return self._solve(problem, _AS_IT_STANDS)
+
+    def _solve(self, problem: Problem, parameters: _Parameters) -> Solution:
+        """One conic program; for the friction margin the value is lambda."""
+        key = structure(problem, torque_limits=False)
+        rest = self._rest.get(key, 0)
+        if rest:
+            self._rest[key] = rest - 1
+        else:
+            solution = self._program(key, problem, False).attempt(problem, parameters)
+            if solution is not None:
+                return solution
+            self._rest[key] = _REST
+        return self._program(structure(problem), problem, True).solve(problem, parameters)
+
+    def _program(self, key: Hashable, problem: Problem, careful: bool) -> _Program:
+        program = self._programs.get((key, careful))
+        if program is None:
+            program = self._programs[key, careful] = _Program(problem, careful)
+        return program
 
 
 @dataclass(frozen=True)
@@ -99,52 +123,84 @@ class _Parameters:
     d: Array | None = None
 
 
-class _Compiled:
+_AS_IT_STANDS = _Parameters()
+
+
+class _Program:
     """A Clarabel solver for one structure; its sparsity holds for all numbers."""
 
-    def __init__(self, problem: Problem) -> None:
-        self.form = ConicForm(problem)
-        self._pattern = sp.csc_matrix(self.form.sparsity(problem), dtype=np.float64)
-        self._rows = self._pattern.indices
-        self._columns = np.repeat(np.arange(self.form.columns), np.diff(self._pattern.indptr))
-        A, b = self.form.matrices(problem)
-        self._solver = self._build(A[self._rows, self._columns], b, solver_settings())
+    def __init__(self, problem: Problem, careful: bool) -> None:
+        """Builds the solver.
 
-    def solve(self, problem: Problem, parameters: _Parameters = _Parameters()) -> Solution:
-        """One conic solve; for the friction margin the value is lambda."""
-        A, b = self.form.matrices(problem, parameters.s, parameters.d)
-        scale = self.form.row_scale(b)
-        result = self._run(A * scale[:, None], b * scale)
-        multipliers = self.form.multipliers(problem, np.array(result.z) * scale, parameters.s)
+        Args:
+            problem: Any problem of the structure.
+            careful: Whether with all rows and iterative refinement, for :meth:`solve`; else without
+                the torque limits and without refinement, for :meth:`attempt`.
+        """
+        self.form = ConicForm(problem, torque_limits=careful)
+        self._pattern = sp.csc_matrix(self.form.sparsity(problem), dtype=np.float64)
+        rows = self._pattern.indices
+        columns = np.repeat(np.arange(self.form.columns), np.diff(self._pattern.indptr))
+        self._entries = rows * self.form.columns + columns
+        settings = solver_settings()
+        settings.iterative_refinement_enable = careful
+        A, b = self.form.matrices(problem)
+        self._solver = self._build(A.take(self._entries), b, settings)
+
+    def attempt(self, problem: Problem, parameters: _Parameters) -> Solution | None:
+        """Solves without the torque limits; None where that is not the answer to (17)."""
+        started = time.perf_counter()
+        A, b, scale = self._scaled(problem, parameters)
+        result = self._update_and_solve(A, b)
+        status = str(result.status)
+        if status == "PrimalInfeasible":
+            proof = certificate(problem, self._multipliers(problem, result, scale, parameters))
+            if proof.proves(_FARTHEST * self.form.force_unit(problem)):
+                raise InfeasibleError(proof)
+        if status != "Solved":
+            return None
+        x = np.array(result.x)
+        if not self._balances(x, A, b, _IMBALANCE):
+            return None
+        solution = self._solution(problem, result, x, scale, parameters, started)
+        joints = problem.joints
+        if joints is not None and not (
+            (solution.tau <= joints.tau_max).all() and (solution.tau >= joints.tau_min).all()
+        ):
+            return None
+        return solution
+
+    def solve(self, problem: Problem, parameters: _Parameters) -> Solution:
+        """Solves all of (17), with differently set solvers where the prebuilt one stalls."""
+        started = time.perf_counter()
+        A, b, scale = self._scaled(problem, parameters)
+        result = self._decided(A, b)
         match str(result.status):
             case "PrimalInfeasible":
+                multipliers = self._multipliers(problem, result, scale, parameters)
                 raise InfeasibleError(certificate(problem, multipliers))
             case "DualInfeasible":
                 raise UnboundedError(problem.objective)
-        x = np.array(result.x)
-        w_OC_C = self.form.wrenches(problem, x)
-        return Solution(
-            problem=problem,
-            value=self.form.value(problem, x),
-            w_OC_C=w_OC_C,
-            tau=problem.torque(w_OC_C),
-            multipliers=multipliers,
-            iterations=result.iterations,
-            solve_s=result.solve_time,
-        )
+        return self._solution(problem, result, np.array(result.x), scale, parameters, started)
 
-    def _run(self, A: Array, b: Array) -> clarabel.DefaultSolution:
-        """Solves with the prebuilt solver, or, where that stalls, with differently set ones."""
-        data = A[self._rows, self._columns]
-        self._solver.update(A=data, b=b)
-        result = self._solver.solve()
+    def _scaled(self, problem: Problem, parameters: _Parameters) -> tuple[Array, Array, Array]:
+        A, b = self.form.matrices(problem, parameters.s, parameters.d)
+        scale = self.form.row_scale(b)
+        return A * scale[:, None], b * scale, scale
+
+    def _update_and_solve(self, A: Array, b: Array) -> clarabel.DefaultSolution:
+        self._solver.update(A=A.take(self._entries), b=b)
+        return self._solver.solve()
+
+    def _decided(self, A: Array, b: Array) -> clarabel.DefaultSolution:
+        result = self._update_and_solve(A, b)
         if self._decides(result, A, b):
             return result
         for regularisation in _FALLBACK_REGULARISATIONS:
             settings = solver_settings()
             settings.equilibrate_enable = False
             settings.static_regularization_constant = regularisation
-            result = self._build(data, b, settings).solve()
+            result = self._build(A.take(self._entries), b, settings).solve()
             if self._decides(result, A, b):
                 return result
         raise SolverError(str(result.status))
@@ -154,9 +210,41 @@ class _Compiled:
         status = str(result.status)
         if status not in SOLVED:
             return status in _PROVEN
-        x, rows = np.array(result.x), self.form.equilibrium_rows
+        return self._balances(np.array(result.x), A, b, _WORST_IMBALANCE)
+
+    def _balances(self, x: Array, A: Array, b: Array, tolerance: float) -> bool:
+        rows = self.form.equilibrium_rows
         largest = max(1.0, float(np.abs(x[: self.form.aux_column]).max()))
-        return bool(np.abs(A[rows] @ x - b[rows]).max() <= _WORST_IMBALANCE * largest)
+        return bool(np.abs(A[rows] @ x - b[rows]).max() <= tolerance * largest)
+
+    def _multipliers(
+        self,
+        problem: Problem,
+        result: clarabel.DefaultSolution,
+        scale: Array,
+        parameters: _Parameters,
+    ) -> Multipliers:
+        return self.form.multipliers(problem, np.array(result.z) * scale, parameters.s)
+
+    def _solution(
+        self,
+        problem: Problem,
+        result: clarabel.DefaultSolution,
+        x: Array,
+        scale: Array,
+        parameters: _Parameters,
+        started: float,
+    ) -> Solution:
+        w_OC_C = self.form.wrenches(problem, x)
+        return Solution(
+            problem=problem,
+            value=self.form.value(problem, x),
+            w_OC_C=w_OC_C,
+            tau=problem.torque(w_OC_C),
+            multipliers=self._multipliers(problem, result, scale, parameters),
+            iterations=result.iterations,
+            solve_s=time.perf_counter() - started,
+        )
 
     def _build(
         self, data: Array, b: Array, settings: clarabel.DefaultSettings
@@ -169,10 +257,12 @@ class _Compiled:
         return clarabel.DefaultSolver(P, q, A, b, self.form.clarabel_cones, settings)
 
 
-def _largest_margin(compiled: _Compiled, problem: Problem) -> Solution:
+def _largest_margin(
+    solve: Callable[[Problem, _Parameters], Solution], problem: Problem
+) -> Solution:
     """Dinkelbach's method; every iterate is feasible, so that stopping early costs margin only."""
-    unit = compiled.form.force_unit(problem)
-    best = last = compiled.solve(problem)
+    unit = problem.load or 1.0
+    best = last = solve(problem, _AS_IT_STANDS)
     iterations, solve_s = last.iterations, last.solve_s
     s, loaded = _largest_utilisation(last, unit)
     for _ in range(_MARGIN_SOLVES):
@@ -180,7 +270,7 @@ def _largest_margin(compiled: _Compiled, problem: Problem) -> Solution:
             break
         slack = np.where(loaded, last.w_OC_C[:, N], 0.0)
         try:
-            last = compiled.solve(problem, _Parameters(s=s, d=slack))
+            last = solve(problem, _Parameters(s=s, d=slack))
         except InfeasibleError:  # At s the cones are left by noise alone.
             break
         iterations += last.iterations
