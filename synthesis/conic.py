@@ -203,6 +203,11 @@ class ConicForm:
         _diagonal(A, self.cone_rows, self.cone_variables, -1.0)
         return A
 
+    def has_loose_limits(self, problem: Problem) -> bool:
+        """Whether rows of limits may need scaling: always, where they are torque limits."""
+        torque = self.upper.size or self.lower.size
+        return bool(torque or problem.contact_set.largest_bound > self.force_unit(problem))
+
     def row_scale(self, b: Array) -> Array:
         """Factors, (rows,), that keep loose limits from drowning the load in the solver's norms."""
         limits = slice(self.f_n_min_rows.start, self.tau_min_rows.stop)

@@ -126,6 +126,7 @@ class ContactSet:
         friction: The same for the tangential components alone, (m, 6).
         f_n_min, f_n_max: Bounds of the normal forces [N], (m,).
         preload: The largest f_n_min [N].
+        largest_bound: The largest finite bound [N].
         structure: What two sets share whose problems differ in numbers only.
 
     Raises:
@@ -152,6 +153,8 @@ class ContactSet:
         self.f_n_min = np.array([c.f_n_min for c in contacts])
         self.f_n_max = np.array([c.f_n_max for c in contacts])
         self.preload = float(self.f_n_min.max())
+        bounds = np.concatenate([self.f_n_min, self.f_n_max])
+        self.largest_bound = float(bounds[np.isfinite(bounds)].max())
         self.structure: Hashable = tuple(
             (c.model, c.role, c.f_n_min > 0.0, math.isfinite(c.f_n_max)) for c in contacts
         )

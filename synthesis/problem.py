@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from enum import StrEnum
 from functools import cached_property
 
@@ -72,10 +72,11 @@ class Joints:
         joints = len(self.names)
         if self.J_C.ndim != 3 or self.J_C.shape[1:] != (6, joints):
             raise InvalidInputError("joints.J_C", f"shape {self.J_C.shape}", f"(n, 6, {joints})")
-        for field in ("tau_g", "tau_min", "tau_max"):
-            _check_shape(f"joints.{field}", getattr(self, field), (joints,))
-        for field in ("J_C", "tau_g"):
-            _check_finite(f"joints.{field}", getattr(self, field))
+        _check_shape("joints.tau_g", self.tau_g, (joints,))
+        _check_shape("joints.tau_min", self.tau_min, (joints,))
+        _check_shape("joints.tau_max", self.tau_max, (joints,))
+        _check_finite("joints.J_C", self.J_C)
+        _check_finite("joints.tau_g", self.tau_g)
         if not (
             (self.tau_min <= self.tau_max).all()
             and self.tau_min.max() < np.inf
@@ -111,6 +112,7 @@ class Problem:
         w_ext_O: External wrench on the object, weight included, in the object frame [N, N·m], (6,).
         joints: The joints behind the hand contacts; None leaves (15) and (16) out.
         objective: Phi.
+        contact_set: What follows from the contacts alone, as arrays; not to be given.
 
     Raises:
         InvalidInputError: A field is non-finite, mis-shaped or senseless.
@@ -122,15 +124,17 @@ class Problem:
     w_ext_O: Array
     joints: Joints | None = None
     objective: Objective = Objective.MAX_NORMAL_FORCE
+    contact_set: ContactSet = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
         m = len(self.contacts)
-        self.contact_set  # noqa: B018 - made here, it checks the names
+        object.__setattr__(self, "contact_set", ContactSet.of(self.contacts))
         _check_shape("R_OC", self.R_OC, (m, 3, 3))
         _check_shape("p_OC_O", self.p_OC_O, (m, 3))
         _check_shape("w_ext_O", self.w_ext_O, (6,))
-        for field in ("R_OC", "p_OC_O", "w_ext_O"):
-            _check_finite(field, getattr(self, field))
+        _check_finite("R_OC", self.R_OC)
+        _check_finite("p_OC_O", self.p_OC_O)
+        _check_finite("w_ext_O", self.w_ext_O)
         self._check_rotations()
         if not self.hands and self.objective is not Objective.FRICTION_MARGIN:
             raise InvalidInputError("contacts", "no hand", f"a hand, as {self.objective} asks")
@@ -173,11 +177,6 @@ class Problem:
                     f"finite with tau_min < 0 < tau_max, as objective {self.objective} asks",
                 )
 
-    @cached_property
-    def contact_set(self) -> ContactSet:
-        """What follows from the contacts alone, as arrays."""
-        return ContactSet.of(self.contacts)
-
     @property
     def hands(self) -> tuple[int, ...]:
         """Indices of the hand contacts, in the order of the Jacobians."""
@@ -204,12 +203,12 @@ class Problem:
         return w_OC_C[self.contact_set.hand_rows].ravel() @ J + self.joints.tau_g
 
 
-def _check_shape(field: str, array: Array, shape: tuple[int, ...]) -> None:
+def _check_shape(name: str, array: Array, shape: tuple[int, ...]) -> None:
     if np.shape(array) != shape:
-        raise InvalidInputError(field, f"shape {np.shape(array)}", f"shape {shape}")
+        raise InvalidInputError(name, f"shape {np.shape(array)}", f"shape {shape}")
 
 
-def _check_finite(field: str, array: Array) -> None:
+def _check_finite(name: str, array: Array) -> None:
     # A finite sum of squares proves it at once; where it is not, numbers may be merely large.
     if not math.isfinite(np.vdot(array, array)) and not np.isfinite(array).all():
-        raise InvalidInputError(field, "a value that is NaN or infinite", "finite numbers")
+        raise InvalidInputError(name, "a value that is NaN or infinite", "finite numbers")

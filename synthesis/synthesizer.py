@@ -16,6 +16,7 @@ keeps it within the cone at s without letting it hold the others back.
 
 from __future__ import annotations
 
+import math
 import time
 from collections.abc import Callable, Hashable
 from dataclasses import dataclass, replace
@@ -93,19 +94,19 @@ class Synthesizer:
         """
         if problem.objective is Objective.FRICTION_MARGIN:
             return _largest_margin(self._solve, problem)
-        return self._solve(problem, _AS_IT_STANDS)
-
-    def _solve(self, problem: Problem, parameters: _Parameters) -> Solution:
-        """One conic program; for the friction margin the value is lambda."""
         key = structure(problem, torque_limits=False)
         rest = self._rest.get(key, 0)
         if rest:
             self._rest[key] = rest - 1
         else:
-            solution = self._program(key, problem, False).attempt(problem, parameters)
+            solution = self._program(key, problem, False).attempt(problem)
             if solution is not None:
                 return solution
             self._rest[key] = _REST
+        return self._solve(problem, _AS_IT_STANDS)
+
+    def _solve(self, problem: Problem, parameters: _Parameters) -> Solution:
+        """One careful solve; for the friction margin the value is lambda."""
         return self._program(structure(problem), problem, True).solve(problem, parameters)
 
     def _program(self, key: Hashable, problem: Problem, careful: bool) -> _Program:
@@ -147,8 +148,9 @@ class _Program:
         A, b = self.form.matrices(problem)
         self._solver = self._build(A.take(self._entries), b, settings)
 
-    def attempt(self, problem: Problem, parameters: _Parameters) -> Solution | None:
+    def attempt(self, problem: Problem) -> Solution | None:
         """Solves without the torque limits; None where that is not the answer to (17)."""
+        parameters = _AS_IT_STANDS
         started = time.perf_counter()
         A, b, scale = self._scaled(problem, parameters)
         result = self._update_and_solve(A, b)
@@ -183,8 +185,12 @@ class _Program:
                 raise UnboundedError(problem.objective)
         return self._solution(problem, result, np.array(result.x), scale, parameters, started)
 
-    def _scaled(self, problem: Problem, parameters: _Parameters) -> tuple[Array, Array, Array]:
+    def _scaled(
+        self, problem: Problem, parameters: _Parameters
+    ) -> tuple[Array, Array, Array | float]:
         A, b = self.form.matrices(problem, parameters.s, parameters.d)
+        if not self.form.has_loose_limits(problem):
+            return A, b, 1.0
         scale = self.form.row_scale(b)
         return A * scale[:, None], b * scale, scale
 
@@ -214,14 +220,14 @@ class _Program:
 
     def _balances(self, x: Array, A: Array, b: Array, tolerance: float) -> bool:
         rows = self.form.equilibrium_rows
-        largest = max(1.0, float(np.abs(x[: self.form.aux_column]).max()))
-        return bool(np.abs(A[rows] @ x - b[rows]).max() <= tolerance * largest)
+        imbalance, forces = A[rows] @ x - b[rows], x[: self.form.aux_column]
+        return math.sqrt(imbalance @ imbalance) <= tolerance * max(1.0, math.sqrt(forces @ forces))
 
     def _multipliers(
         self,
         problem: Problem,
         result: clarabel.DefaultSolution,
-        scale: Array,
+        scale: Array | float,
         parameters: _Parameters,
     ) -> Multipliers:
         return self.form.multipliers(problem, np.array(result.z) * scale, parameters.s)
@@ -231,7 +237,7 @@ class _Program:
         problem: Problem,
         result: clarabel.DefaultSolution,
         x: Array,
-        scale: Array,
+        scale: Array | float,
         parameters: _Parameters,
         started: float,
     ) -> Solution:
