@@ -281,7 +281,8 @@ class ConicForm:
         )
         cone = cone.reshape(self.m, 6)
         cone *= problem.contact_set.reciprocal
-        cone[self.cone_contacts, N] *= utilisation
+        if self.objective is Objective.FRICTION_MARGIN:
+            cone[self.cone_contacts, N] *= utilisation
         match self.objective:
             case Objective.MAX_NORMAL_FORCE:
                 gradient = z[self.linear_rows]
