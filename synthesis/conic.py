@@ -23,6 +23,9 @@ For the friction margin the cones read :math:`\|f_t\| \le s f_n + \lambda d_i` w
 :math:`s, d_i`, and all contacts count as preloaded, for at :math:`s = 0` the cones leave
 :math:`f_n` free; see :mod:`synthesis.synthesizer`.
 
+Without the torque limits the form is a relaxation, with two thirds fewer entries for
+two arms of seven joints; see :mod:`synthesis.synthesizer`.
+
 All forces and torques are in units of :meth:`ConicForm.force_unit`, so that the solver's tolerances
 are relative to the load. The equations are homogeneous in them: A does not change.
 """
@@ -36,7 +39,7 @@ import clarabel
 import numpy as np
 from numpy.typing import NDArray
 
-from synthesis.contact import Array, N, Role
+from synthesis.contact import Array, N
 from synthesis.problem import Objective, Problem
 from synthesis.solution import Multipliers
 
@@ -86,7 +89,9 @@ class ConicForm:
         self.hand_normals = self.normal_columns[hands]
 
         margin = objective is Objective.FRICTION_MARGIN
-        preloaded = [c.f_n_min > 0.0 or w == 1 or margin for c, w in zip(contacts, widths)]
+        preloaded = [
+            c.f_n_min > 0.0 or w == 1 or margin for c, w in zip(contacts, widths, strict=True)
+        ]
         self.preloaded = np.flatnonzero(preloaded)
         self.limited = np.flatnonzero(np.isfinite(facts.f_n_max))
         none = np.zeros(0, dtype=np.intp)

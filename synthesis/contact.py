@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections import Counter
-from collections.abc import Hashable
 from dataclasses import dataclass
 from enum import StrEnum
 from functools import cached_property, lru_cache
@@ -137,9 +136,7 @@ class ContactSet:
         check_names("contacts", tuple(c.name for c in contacts))
         self.hands = tuple(i for i, c in enumerate(contacts) if c.role is Role.HAND)
         in_order = self.hands == tuple(range(len(self.hands)))
-        self.hand_rows: slice | list[int] = (
-            slice(len(self.hands)) if in_order else list(self.hands)
-        )
+        self.hand_rows: slice | list[int] = slice(len(self.hands)) if in_order else list(self.hands)
         self.widths = tuple(len(c.model.components) for c in contacts)
         self.starts = np.cumsum([0, *self.widths])
         self.flat = np.concatenate(
@@ -155,8 +152,9 @@ class ContactSet:
         self.preload = float(self.f_n_min.max())
         bounds = np.concatenate([self.f_n_min, self.f_n_max])
         self.largest_bound = float(bounds[np.isfinite(bounds)].max())
-        self.structure: Hashable = tuple(
-            (c.model, c.role, c.f_n_min > 0.0, math.isfinite(c.f_n_max)) for c in contacts
+        # One string, for its hash is kept.
+        self.structure = " ".join(
+            f"{c.model}|{c.role}|{c.f_n_min > 0.0}|{math.isfinite(c.f_n_max)}" for c in contacts
         )
 
     @staticmethod

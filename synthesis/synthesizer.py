@@ -1,5 +1,14 @@
 r"""Solves contact force synthesis problems on Clarabel, one prebuilt solver per structure.
 
+Torque limits are most of (17)'s numbers and bind seldom. So a problem is first attempted without
+them: over a larger set the optimum is no worse, so that one which happens to keep (16) is optimal
+for (17), with multipliers of zero for (16); and multipliers that prove the relaxed problem
+infeasible prove (17) so. The attempt also goes without iterative refinement: Clarabel stops by
+residuals that it computes from the data, whatever the accuracy of its steps. It counts if it is
+``Solved`` to the full tolerance, balances the object and keeps (16); or if its proof of
+infeasibility holds. On anything else the whole problem is solved, carefully. The friction margin,
+which squeezes until a limit binds, is not attempted.
+
 The friction margin, the smallest largest utilisation :math:`\|f_t\| / f_n` of all contacts, is a
 ratio and so quasi-convex. It is found by Dinkelbach's method for the largest of several ratios
 (Crouzeix, Ferland, Schaible 1985): at the utilisation :math:`s` of the last forces solve
@@ -32,7 +41,8 @@ from synthesis.errors import InfeasibleError, SolverError, UnboundedError
 from synthesis.problem import Objective, Problem
 from synthesis.solution import Multipliers, Solution, certificate
 
-# Feasibility and gap, relative: well under the 1e-6 to which the torque matters. On degenerate
+# Feasibility and gap, relative to the load: 1e-6 of an objective that is a thousandth of the load,
+# as near the balance point, at the cost of one iteration more than 1e-7 takes. On degenerate
 # problems the linear algebra stalls a little above the first; the second is accepted, too.
 TOLERANCE = 1e-9
 _ACCEPTED_TOLERANCE = 1e-8
@@ -81,8 +91,8 @@ class Synthesizer:
     """
 
     def __init__(self) -> None:
+        self._attempts: dict[Hashable, _Program] = {}
         self._programs: dict[Hashable, _Program] = {}
-        self._rest: dict[Hashable, int] = {}
 
     def solve(self, problem: Problem) -> Solution:
         """Solves (17).
@@ -94,25 +104,26 @@ class Synthesizer:
         """
         if problem.objective is Objective.FRICTION_MARGIN:
             return _largest_margin(self._solve, problem)
-        key = structure(problem, torque_limits=False)
-        rest = self._rest.get(key, 0)
-        if rest:
-            self._rest[key] = rest - 1
+        quick = self._program(self._attempts, problem, careful=False)
+        if quick.rest:
+            quick.rest -= 1
         else:
-            solution = self._program(key, problem, False).attempt(problem)
+            solution = quick.attempt(problem)
             if solution is not None:
                 return solution
-            self._rest[key] = _REST
+            quick.rest = _REST
         return self._solve(problem, _AS_IT_STANDS)
 
     def _solve(self, problem: Problem, parameters: _Parameters) -> Solution:
         """One careful solve; for the friction margin the value is lambda."""
-        return self._program(structure(problem), problem, True).solve(problem, parameters)
+        return self._program(self._programs, problem, careful=True).solve(problem, parameters)
 
-    def _program(self, key: Hashable, problem: Problem, careful: bool) -> _Program:
-        program = self._programs.get((key, careful))
+    @staticmethod
+    def _program(programs: dict[Hashable, _Program], problem: Problem, careful: bool) -> _Program:
+        key = structure(problem, torque_limits=careful)
+        program = programs.get(key)
         if program is None:
-            program = self._programs[key, careful] = _Program(problem, careful)
+            program = programs[key] = _Program(problem, careful)
         return program
 
 
@@ -128,7 +139,12 @@ _AS_IT_STANDS = _Parameters()
 
 
 class _Program:
-    """A Clarabel solver for one structure; its sparsity holds for all numbers."""
+    """A Clarabel solver for one structure; its sparsity holds for all numbers.
+
+    Attributes:
+        form: The structure.
+        rest: How many problems are yet to be left to the careful program.
+    """
 
     def __init__(self, problem: Problem, careful: bool) -> None:
         """Builds the solver.
@@ -138,6 +154,7 @@ class _Program:
             careful: Whether with all rows and iterative refinement, for :meth:`solve`; else without
                 the torque limits and without refinement, for :meth:`attempt`.
         """
+        self.rest = 0
         self.form = ConicForm(problem, torque_limits=careful)
         self._pattern = sp.csc_matrix(self.form.sparsity(problem), dtype=np.float64)
         rows = self._pattern.indices
