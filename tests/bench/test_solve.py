@@ -1,0 +1,232 @@
+"""The synthesis tick and its peers on the same poses of the box path, and how the solve grows.
+
+Every row is the median over all poses; bars compare rows of this one run. Timing fails no test, but
+a peer that gives another optimum, or a verdict without a proof, does.
+"""
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+from scenarios import scenario
+from sim.ik import plan_joints
+from sim.path import ScrewPath
+from sim.robot import RobotModel
+from sim.statics import Statics
+from synthesis import (
+    Contact,
+    ContactModel,
+    InfeasibleError,
+    Joints,
+    Problem,
+    Role,
+    Synthesizer,
+)
+from tests.bench import peers
+
+POSES = 1001
+SLOW_POSES = 100
+SOLVES = "max-normal-force along the box path"
+GROWTH = "growth of the solve"
+FACETS = (4, 8, 16)
+QP_SOLVERS = ("daqp", "proxqp", "piqp")
+EXACT = {
+    "Clarabel, update + solve, all rows": peers.Clarabel,
+    "ECOS, prebuilt matrices": peers.Ecos,
+    "QOCO, update + solve": peers.Qoco,
+    "CVXPY with parameters": peers.CvxpyParameters,
+    "Drake MathematicalProgram, Clarabel": peers.Drake,
+    "CVXPY rebuilt per call": peers.CvxpyRebuilt,
+}
+PYRAMIDS = [(solver, facets) for facets in FACETS for solver in QP_SOLVERS]
+
+
+class BoxPath:
+    """States and problems along the box's path."""
+
+    def __init__(self):
+        box_tilt = scenario("box-tilt")
+        path, joint_path = ScrewPath(box_tilt.path), plan_joints(box_tilt)
+        self.robot = RobotModel(box_tilt)
+        self.statics = Statics(box_tilt, box_tilt.control, self.robot)
+        self.synthesizer = Synthesizer()
+        self.states = []
+        for tilt in np.linspace(0.0, path.end, POSES):
+            R_WO, p_WO = path.pose(tilt)
+            quat_WO = Rotation.from_matrix(R_WO).as_quat(scalar_first=True)
+            self.states.append((joint_path.holding(tilt), p_WO, quat_WO))
+        self.problems = [self.problem(*state) for state in self.states]
+        self.values = np.array([self.synthesizer.solve(p).value for p in self.problems])
+
+    def problem(self, q, p_WO, quat_WO):
+        self.robot.update(q)
+        return self.statics.problem(p_WO, quat_WO)
+
+    def tick(self, q, p_WO, quat_WO):
+        return self.synthesizer.solve(self.problem(q, p_WO, quat_WO))
+
+
+@pytest.fixture(scope="module")
+def box_path():
+    return BoxPath()
+
+
+def test_tick(box_path, timed, table):
+    samples = timed(SOLVES, "our tick: model, assembly, solve, checks", box_path.tick,
+                    box_path.states)  # fmt: skip
+    table.bar("tick: p99 over median", np.percentile(samples, 99) / np.median(samples), 3.0)
+
+
+def test_solve(box_path, timed):
+    timed(SOLVES, "our solve: assembly, solve, unpacking, checks", box_path.synthesizer.solve,
+          [(p,) for p in box_path.problems])  # fmt: skip
+
+
+@pytest.mark.parametrize("name", EXACT)
+def test_exact_peer(name, box_path, timed, table):
+    problems = box_path.problems
+    try:
+        peer = EXACT[name](problems)
+    except ImportError as error:
+        table.skip(SOLVES, name, error)
+        pytest.skip(f"{error}")
+    timed(SOLVES, name, peer.solve, [peer.prepare(p) for p in problems])
+    for problem, ours in list(zip(problems, box_path.values, strict=True))[:: POSES // SLOW_POSES]:
+        value = peer.value(peer.solve(*peer.prepare(problem)), problem)
+        # The loosest of the peers' tolerances, on the scale of the load.
+        assert abs(value - ours) <= 1e-6 * problem.load
+
+
+@pytest.mark.parametrize(("solver", "facets"), PYRAMIDS)
+def test_pyramids(solver, facets, box_path, timed, table):
+    problems, name = box_path.problems, f"{facets}-facet pyramids, {solver}"
+    try:
+        peer = peers.Pyramids(problems, facets, solver)
+    except ImportError as error:
+        table.skip(SOLVES, name, error)
+        pytest.skip(f"{error}")
+    prepared = [peer.prepare(p) for p in problems]
+    values = np.array(
+        [peer.value(peer.solve(*a), p) for a, p in zip(prepared, problems, strict=True)]
+    )
+    found = np.isfinite(values)
+    extra = values[found] / box_path.values[found] - 1.0
+    # An inner approximation cannot grip less than the exact cone, to the QP solvers' tolerance.
+    assert extra.min() > -1e-4
+    note = f"grip {100 * extra.mean():+.1f} %, at most {100 * extra.max():+.1f} %"
+    if not found.all():
+        note += f"; no solution at {int((~found).sum())} poses"
+    timed(SOLVES, name, peer.solve, prepared, note)
+
+
+def test_bars_of_the_solve(table):
+    ours, tick = (table.value(f"our {k}") for k in (
+        "solve: assembly, solve, unpacking, checks", "tick: model, assembly, solve, checks"))  # fmt: skip
+    asked = {
+        "solve over CVXPY rebuilt per call": ("CVXPY rebuilt per call", 0.05),
+        "solve over CVXPY with parameters": ("CVXPY with parameters", 0.1),
+        "solve over ECOS": ("ECOS, prebuilt matrices", 0.8),
+        "solve over QOCO": ("QOCO, update + solve", 1.1),
+    }
+    for name, (row, limit) in asked.items():
+        if table.value(row) and ours:
+            table.bar(name, ours / table.value(row), limit)
+    eight = [table.value(f"8-facet pyramids, {solver}") for solver in QP_SOLVERS]
+    if any(eight) and ours:
+        table.bar("solve over the fastest 8-facet QP", ours / min(filter(None, eight)), 1.0)
+    bare = table.value("Clarabel, update + solve, all rows")
+    if bare and tick:
+        table.bar("tick over the bare solve of all rows", tick / bare, 2.5)
+
+
+def grasp(count, arms, rng):
+    """A block on supports held by hands around it: half of the contacts each, torque limits wide.
+
+    The hand contacts are shared out over the arms, seven joints each.
+    """
+    hands = count // 2
+    contacts, R_OC, p_OC_O = [], [], []
+    for i in range(count):
+        role = Role.HAND if i < hands else Role.ENVIRONMENT
+        model = ContactModel.SFCE if i < hands else ContactModel.PCWF
+        contacts.append(Contact(f"{role} {i}", role, model, mu=0.3, e_n=0.01))
+        side = 1.0 if i % 2 else -1.0
+        normal = np.array([0.0, -side, 0.0] if i < hands else [0.0, 0.0, 1.0])
+        tangent = np.array([1.0, 0.0, 0.0])
+        R_OC.append(np.column_stack([tangent, np.cross(normal, tangent), normal]))
+        spread = rng.uniform(-0.1, 0.1, size=3)
+        p_OC_O.append([spread[0], 0.1 * side, spread[2]] if i < hands else [*spread[:2], -0.1])
+    l = 7 * arms
+    J_C = np.zeros((hands, 6, l))
+    for i in range(hands):
+        own = slice(7 * (i % arms), 7 * (i % arms) + 7)
+        J_C[i, :, own] = 0.3 * rng.normal(size=(6, 7))
+    limit = np.full(l, 50.0)
+    joints = Joints(tuple(f"joint {k}" for k in range(l)), J_C, rng.normal(size=l), -limit, limit)
+    pull = np.array([rng.uniform(-1.0, 1.0), rng.uniform(-1.0, 1.0), -20.0, 0.0, 0.0, 0.0])
+    return Problem(tuple(contacts), np.array(R_OC), np.array(p_OC_O), pull, joints)
+
+
+def grasps(count, arms):
+    """One grasp under many loads."""
+    rng = np.random.default_rng([count, arms])
+    first = grasp(count, arms, rng)
+    # Lifting at the side with fewer hands than supports: loads that every contact shares in.
+    loads = rng.uniform(-1.0, 1.0, size=(SLOW_POSES * 2, 6)) * [4.0, 1.0, 4.0, 0.1, 0.1, 0.1]
+    return [replace(first, w_ext_O=first.w_ext_O + load) for load in loads]
+
+
+@pytest.mark.parametrize("count", [4, 8, 16, 32, 64])
+def test_growth_with_contacts(count, timed):
+    synthesizer = Synthesizer()
+    timed(GROWTH, f"{count} contacts, 2 arms", synthesizer.solve, [(p,) for p in grasps(count, 2)])
+
+
+def test_growth_with_arms(timed):
+    synthesizer = Synthesizer()
+    timed(GROWTH, "8 contacts, 4 arms", synthesizer.solve, [(p,) for p in grasps(8, 4)])
+
+
+def test_bar_of_the_growth(table):
+    sizes = np.array([4, 8, 16, 32, 64])
+    times = [table.value(f"{size} contacts, 2 arms") for size in sizes]
+    if all(times):
+        table.bar("growth from 4 to 64 contacts, exponent", math.log(times[-1] / times[0], 16), 1.3)
+        slope = float(np.polyfit(np.log(sizes), np.log(times), 1)[0])
+        table.add(GROWTH, "exponent, fitted to all five", slope, "")
+
+
+def weak(problem):
+    joints = problem.joints
+    weak = replace(joints, tau_min=0.2 * joints.tau_min, tau_max=0.2 * joints.tau_max)
+    return replace(problem, joints=weak)
+
+
+def loose(problem):
+    contacts = tuple(replace(c, f_n_max=5.0 if c.role is Role.HAND else c.f_n_max)
+                     for c in problem.contacts)  # fmt: skip
+    return replace(problem, contacts=contacts)
+
+
+@pytest.mark.parametrize("change", [weak, loose], ids=["torque", "grip"])
+def test_infeasible_verdict(change, box_path, timed):
+    synthesizer = Synthesizer()
+
+    def verdict(problem):
+        try:
+            synthesizer.solve(problem)
+        except InfeasibleError as error:
+            # No force here is a thousand times the load.
+            return error.certificate.proves(1e3 * problem.load)
+        return None
+
+    problems = [change(p) for p in box_path.problems[: POSES // 2]]
+    arguments = [(p,) for p in problems if verdict(p) is not None]
+    assert len(arguments) > SLOW_POSES
+    assert all(verdict(*a) for a in arguments)
+    name = {weak: "a fifth of the torque", loose: "a grip of 5 N"}[change]
+    timed("infeasible verdict with checked certificate", name, verdict, arguments,
+          f"{len(arguments)} poses")  # fmt: skip
