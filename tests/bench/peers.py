@@ -21,8 +21,8 @@ TOLERANCE = 1e-9
 class Matrices:
     """The conic form of all poses, prebuilt: rows in the order equalities, inequalities, cones."""
 
-    def __init__(self, problems):
-        self.form = form = ConicForm(problems[0])
+    def __init__(self, problems, torque_limits=True):
+        self.form = form = ConicForm(problems[0], torque_limits)
         mask = form.sparsity(problems[0])
         self.q = np.zeros(form.columns)
         self.q[form.aux_column] = 1.0
@@ -30,7 +30,6 @@ class Matrices:
         self.widths = [width for _, width in form.cones]
         equality, conic = mask[:6], mask[6:]
         self.A_pattern, self.G_pattern = (_pattern(rows) for rows in (equality, conic))
-        self.unit = problems[0].load
 
     def dense(self, problem):
         A, b = self.form.matrices(problem)
@@ -59,16 +58,22 @@ def fill(pattern, dense):
 
 
 class Clarabel:
-    """Clarabel, update and solve on prebuilt matrices of all rows: the bare solve."""
+    """Clarabel, update and solve on prebuilt matrices: the bare solve.
 
-    def __init__(self, problems):
-        self.matrices = matrices = Matrices(problems)
+    With all rows it is set as the synthesis sets it for a careful solve, without the torque limits
+    as for an attempt.
+    """
+
+    def __init__(self, problems, torque_limits=True):
+        self.matrices = matrices = Matrices(problems, torque_limits)
+        settings = solver_settings()
+        settings.iterative_refinement_enable = torque_limits
         form = matrices.form
         self.pattern = _pattern(form.sparsity(problems[0]))
         A, b = matrices.dense(problems[0])
         P = sp.csc_matrix((form.columns, form.columns))
         self.solver = clarabel.DefaultSolver(
-            P, matrices.q, fill(self.pattern, A), b, form.clarabel_cones, solver_settings()
+            P, matrices.q, fill(self.pattern, A), b, form.clarabel_cones, settings
         )
 
     def prepare(self, problem):
