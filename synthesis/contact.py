@@ -216,7 +216,7 @@ def grasp_maps(R_OC: Array, p_OC_O: Array) -> Array:
     """
     G = np.zeros((len(R_OC), 6, 6))
     G[:, :3, :3] = R_OC
-    G[:, 3:, :3] = skew(p_OC_O) @ R_OC
+    np.matmul(skew(p_OC_O), R_OC, out=G[:, 3:, :3])
     G[:, 3:, 3:] = R_OC
     return G
 

@@ -6,6 +6,7 @@ import math
 from dataclasses import dataclass, field
 from enum import StrEnum
 from functools import cached_property
+from operator import le
 
 import numpy as np
 
@@ -77,10 +78,10 @@ class Joints:
         _check_shape("joints.tau_max", self.tau_max, (joints,))
         _check_finite("joints.J_C", self.J_C)
         _check_finite("joints.tau_g", self.tau_g)
-        ordered = (
-            (self.tau_min <= self.tau_max) & (self.tau_min < np.inf) & (self.tau_max > -np.inf)
-        )
-        if not ordered.all():
+        low, high = self.tau_min.tolist(), self.tau_max.tolist()
+        if not (all(map(le, low, high)) and max(low) < math.inf and min(high) > -math.inf):
+            ordered = self.tau_min <= self.tau_max
+            ordered &= (self.tau_min < np.inf) & (self.tau_max > -np.inf)
             worst = int(np.argmin(ordered))
             raise InvalidInputError(
                 f"joints.tau_min[{self.names[worst]}]",
