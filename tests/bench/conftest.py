@@ -3,6 +3,7 @@
 import json
 import os
 import platform
+import time
 from dataclasses import asdict, dataclass, field
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
@@ -13,6 +14,8 @@ import pytest
 PACKAGES = ("clarabel", "numpy", "cvxpy", "ecos", "qoco", "qpsolvers", "daqp", "proxsuite", "piqp",
             "drake", "mujoco", "pin")  # fmt: skip
 WARM_UP = 50
+# Poses per turn of two functions that are compared.
+TURN = 20
 
 
 @dataclass(frozen=True)
@@ -94,6 +97,21 @@ def timed(benchmark, table):
         return samples
 
     return run
+
+
+def ratio(first, second):
+    """Median time of one function over that of another, each a pair of function and arguments.
+
+    They take turns, some poses each, so that whatever else the machine does slows both.
+    """
+    times = [], []
+    for start in range(0, len(first[1]), TURN):
+        for samples, (function, arguments) in zip(times, (first, second), strict=True):
+            for args in arguments[start : start + TURN]:
+                started = time.perf_counter()
+                function(*args)
+                samples.append(time.perf_counter() - started)
+    return float(np.median(times[0]) / np.median(times[1]))
 
 
 def pytest_addoption(parser):
