@@ -1,14 +1,20 @@
 PYTHON ?= python3.11
 BIN := .venv/bin
 STAMP := .venv/.installed
+BENCH_STAMP := .venv/.installed-bench
+OUT ?= logs/benchmark.json
 
-.PHONY: demo test lint type format assets clean
+.PHONY: demo test bench lint type format assets clean
 
 demo: $(STAMP)
 	$(BIN)/fulcrum run box-tilt
 
 test: $(STAMP)
 	$(BIN)/pytest
+
+# One process, nothing beside it: what is timed is compared within this run.
+bench: $(BENCH_STAMP)
+	$(BIN)/pytest tests/bench -n 0 --out $(OUT)
 
 lint: $(STAMP)
 	$(BIN)/ruff check .
@@ -29,6 +35,10 @@ assets: $(STAMP)
 $(STAMP): pyproject.toml constraints.txt
 	$(PYTHON) -m venv .venv
 	$(BIN)/pip install --quiet --disable-pip-version-check -c constraints.txt -e ".[dev]"
+	touch $@
+
+$(BENCH_STAMP): $(STAMP)
+	$(BIN)/pip install --quiet --disable-pip-version-check -c constraints.txt -e ".[dev,bench]"
 	touch $@
 
 clean:

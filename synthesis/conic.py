@@ -23,6 +23,9 @@ For the friction margin the cones read :math:`\|f_t\| \le s f_n + \lambda d_i` w
 :math:`s, d_i`, and all contacts count as preloaded, for at :math:`s = 0` the cones leave
 :math:`f_n` free; see :mod:`synthesis.synthesizer`.
 
+Without the torque limits the form is a relaxation, with two thirds fewer entries for
+two arms of seven joints; see :mod:`synthesis.synthesizer`.
+
 All forces and torques are in units of :meth:`ConicForm.force_unit`, so that the solver's tolerances
 are relative to the load. The equations are homogeneous in them: A does not change.
 """
@@ -30,77 +33,78 @@ are relative to the load. The equations are homogeneous in them: A does not chan
 from __future__ import annotations
 
 from collections.abc import Hashable
+from itertools import pairwise
 
 import clarabel
 import numpy as np
 from numpy.typing import NDArray
 
-from synthesis.contact import Array, N, Role
+from synthesis.contact import Array, N
 from synthesis.problem import Objective, Problem
 from synthesis.solution import Multipliers
 
 _LINEAR_IN_TORQUE = (Objective.MAX_TORQUE, Objective.MAX_TORQUE_UTILISATION)
 
 
-def structure(problem: Problem) -> Hashable:
+def structure(problem: Problem, torque_limits: bool = True) -> Hashable:
     """What two problems must share to be solved by the same prebuilt solver."""
     joints = problem.joints
+    limits: Hashable = None
+    if joints is not None and torque_limits:
+        limits = np.isfinite(joints.tau_min).tobytes(), np.isfinite(joints.tau_max).tobytes()
     return (
-        tuple((c.model, c.role, c.f_n_min > 0.0, np.isfinite(c.f_n_max)) for c in problem.contacts),
-        joints
-        and (
-            len(joints.names),
-            *(np.isfinite(t).tobytes() for t in (joints.tau_min, joints.tau_max)),
-        ),
+        problem.contact_set.structure,
         problem.objective,
+        0 if joints is None else len(joints.names),
+        limits,
     )
 
 
 class ConicForm:
     """Index maps of one problem structure, made once; numbers flow through them at each solve."""
 
-    def __init__(self, problem: Problem) -> None:
+    def __init__(self, problem: Problem, torque_limits: bool = True) -> None:
+        """Lays out rows and columns.
+
+        Args:
+            problem: Any problem of the structure.
+            torque_limits: Whether (16) has rows; without them the form is a relaxation.
+        """
         contacts, joints, objective = problem.contacts, problem.joints, problem.objective
-        widths = [len(c.model.components) for c in contacts]
-        starts = np.cumsum([0, *widths])
+        facts = problem.contact_set
+        widths, starts = facts.widths, facts.starts
         self.m = len(contacts)
         self.objective = objective
         self.normal_columns = starts[:-1]
         self.aux_column = int(starts[-1])
         self.columns = self.aux_column + 1
-        # Flat position in the (m, 6) wrenches of each variable, and its contact.
-        self.flat = np.concatenate(
-            [6 * i + np.array(c.model.components) for i, c in enumerate(contacts)]
-        )
-        hands = list(problem.hands)
-        in_hand = np.concatenate(
-            [np.full(w, c.role is Role.HAND) for c, w in zip(contacts, widths, strict=True)]
-        )
-        self.hand_columns = np.flatnonzero(in_hand)
+        # Flat position in the (m, 6) wrenches of each variable.
+        self.flat = facts.flat
+        hands = list(facts.hands)
+        self.hand_columns = np.flatnonzero(np.isin(self.flat // 6, hands))
         hand_rank = {i: rank for rank, i in enumerate(hands)}
         self.hand_flat = np.array(
-            [6 * hand_rank[f // 6] + f % 6 for f in self.flat[in_hand]], dtype=np.intp
+            [6 * hand_rank[f // 6] + f % 6 for f in self.flat[self.hand_columns]], dtype=np.intp
         )
         self.hand_normals = self.normal_columns[hands]
 
-        self.preloaded = np.array(
-            [
-                i
-                for i, c in enumerate(contacts)
-                if c.f_n_min > 0.0 or widths[i] == 1 or objective is Objective.FRICTION_MARGIN
-            ],
-            dtype=np.intp,
-        )
-        self.limited = np.array(
-            [i for i, c in enumerate(contacts) if np.isfinite(c.f_n_max)], dtype=np.intp
-        )
+        margin = objective is Objective.FRICTION_MARGIN
+        preloaded = [
+            c.f_n_min > 0.0 or w == 1 or margin for c, w in zip(contacts, widths, strict=True)
+        ]
+        self.preloaded = np.flatnonzero(preloaded)
+        self.limited = np.flatnonzero(np.isfinite(facts.f_n_max))
         none = np.zeros(0, dtype=np.intp)
-        self.upper = none if joints is None else np.flatnonzero(np.isfinite(joints.tau_max))
-        self.lower = none if joints is None else np.flatnonzero(np.isfinite(joints.tau_min))
+        bounded = joints if torque_limits else None
+        self.upper = none if bounded is None else np.flatnonzero(np.isfinite(bounded.tau_max))
+        self.lower = none if bounded is None else np.flatnonzero(np.isfinite(bounded.tau_min))
         self.cones = [(i, w) for i, w in enumerate(widths) if w > 1]
+        self._needs_torque = bool(self.upper.size or self.lower.size or objective.needs_joints)
         self._lay_out_rows(0 if joints is None else len(joints.names), starts, widths)
+        self._lay_out_multipliers(0 if joints is None else len(joints.names), facts.f_n_min)
+        self._constant = self._constant_entries()
 
-    def _lay_out_rows(self, l: int, starts: Array, widths: list[int]) -> None:
+    def _lay_out_rows(self, l: int, starts: Array, widths: tuple[int, ...]) -> None:
         linear = {
             Objective.MAX_NORMAL_FORCE: len(self.hand_normals),
             Objective.MAX_TORQUE: 2 * l,
@@ -139,16 +143,9 @@ class ConicForm:
             self.clarabel_cones.append(clarabel.SecondOrderConeT(cone))
         self.clarabel_cones += [clarabel.SecondOrderConeT(w) for _, w in self.cones]
 
-    def scale(self, problem: Problem) -> Array:
-        """Contact scales of all variables, (columns - 1,)."""
-        return np.concatenate([c.scale for c in problem.contacts])
-
     def force_unit(self, problem: Problem) -> float:
         """Unit of forces and torques inside the solver: the largest load [N or N·m]."""
-        loads = [*np.abs(problem.w_ext_O), *(c.f_n_min for c in problem.contacts)]
-        if problem.joints is not None and problem.objective.needs_joints:
-            loads += [*np.abs(problem.joints.tau_g)]
-        return float(max(loads)) or 1.0
+        return problem.load or 1.0
 
     def value_unit(self, problem: Problem) -> float:
         """Unit of the auxiliary variable, and so of the objective, inside the solver."""
@@ -171,41 +168,55 @@ class ConicForm:
             slack: The parameters d of the friction-margin problem [N], (m,); default all one
                 force unit, with the bound lambda <= 0 that makes the cones hold as they stand.
         """
-        A = np.zeros((self.rows, self.columns))
+        A = self._constant.copy()
         b = np.zeros(self.rows)
-        scale = self.scale(problem)
+        facts = problem.contact_set
         unit = self.force_unit(problem)
         f = self.aux_column
-        G = problem.G.transpose(1, 0, 2).reshape(6, 6 * self.m)
-        A[self.equilibrium_rows, :f] = G[:, self.flat] * scale
+        # Row k of the transposed maps, stacked, is the wrench on the object of variable k.
+        G = problem.G.transpose(0, 2, 1).reshape(-1, 6)[self.flat]
+        A[self.equilibrium_rows, :f] = (G * facts.scale[:, None]).T
         b[self.equilibrium_rows] = -problem.w_ext_O
-        _diagonal(A, self.f_n_min_rows, self.normal_columns[self.preloaded], -1.0)
-        b[self.f_n_min_rows] = [-problem.contacts[i].f_n_min for i in self.preloaded]
-        _diagonal(A, self.f_n_max_rows, self.normal_columns[self.limited], 1.0)
-        b[self.f_n_max_rows] = [problem.contacts[i].f_n_max for i in self.limited]
-        if problem.joints is not None:
-            self._torque_rows(A, b, problem, scale)
-        if self.objective is Objective.MAX_NORMAL_FORCE:
-            _diagonal(A, self.linear_rows, self.hand_normals, 1.0)
-            A[self.linear_rows, f] = -1.0
-        elif self.objective is Objective.NORM_NORMAL_FORCE:
-            A[self.norm_rows.start, f] = -1.0
-            _diagonal(
-                A, slice(self.norm_rows.start + 1, self.norm_rows.stop), self.hand_normals, -1.0
-            )
-        elif self.objective is Objective.FRICTION_MARGIN:
-            A[self.linear_rows, f] = 1.0
-            b[self.linear_rows] = 0.0 if slack is None else unit
-        _diagonal(A, self.cone_rows, self.cone_variables, -1.0)
+        b[self.f_n_min_rows] = -facts.f_n_min[self.preloaded]
+        b[self.f_n_max_rows] = facts.f_n_max[self.limited]
+        if self._needs_torque:
+            self._torque_rows(A, b, problem, facts.scale)
         if self.objective is Objective.FRICTION_MARGIN:
+            b[self.linear_rows] = 0.0 if slack is None else unit
             A[self.cone_heads, self.normal_columns[self.cone_contacts]] = -utilisation
             A[self.cone_heads, f] = -1.0 if slack is None else -slack[self.cone_contacts] / unit
         return A, b / unit
 
+    def _constant_entries(self) -> Array:
+        """A, with zeros where its entries depend on the problem's numbers."""
+        A = np.zeros((self.rows, self.columns))
+        f = self.aux_column
+        _diagonal(A, self.f_n_min_rows, self.normal_columns[self.preloaded], -1.0)
+        _diagonal(A, self.f_n_max_rows, self.normal_columns[self.limited], 1.0)
+        match self.objective:
+            case Objective.MAX_NORMAL_FORCE:
+                _diagonal(A, self.linear_rows, self.hand_normals, 1.0)
+                A[self.linear_rows, f] = -1.0
+            case Objective.NORM_NORMAL_FORCE:
+                A[self.norm_rows.start, f] = -1.0
+                normals = slice(self.norm_rows.start + 1, self.norm_rows.stop)
+                _diagonal(A, normals, self.hand_normals, -1.0)
+            case Objective.NORM_TORQUE:
+                A[self.norm_rows.start, f] = -1.0
+            case Objective.FRICTION_MARGIN:
+                A[self.linear_rows, f] = 1.0
+        _diagonal(A, self.cone_rows, self.cone_variables, -1.0)
+        return A
+
+    def has_loose_limits(self, problem: Problem) -> bool:
+        """Whether rows of limits may need scaling: always, where they are torque limits."""
+        torque = self.upper.size or self.lower.size
+        return bool(torque or problem.contact_set.largest_bound > self.force_unit(problem))
+
     def row_scale(self, b: Array) -> Array:
         """Factors, (rows,), that keep loose limits from drowning the load in the solver's norms."""
-        scale = np.ones(self.rows)
         limits = slice(self.f_n_min_rows.start, self.tau_min_rows.stop)
+        scale = np.ones(self.rows)
         scale[limits] = 1.0 / np.maximum(1.0, np.abs(b[limits]))
         return scale
 
@@ -239,7 +250,6 @@ class ConicForm:
             b[self.linear_rows] = np.concatenate([-joints.tau_g, joints.tau_g])
             A[self.linear_rows, f] = -self._torque_bounds(problem)
         elif self.objective is Objective.NORM_TORQUE:
-            A[self.norm_rows.start, f] = -1.0
             A[self.norm_rows.start + 1 : self.norm_rows.stop, :f] = -JT
             b[self.norm_rows.start + 1 : self.norm_rows.stop] = joints.tau_g
 
@@ -262,22 +272,22 @@ class ConicForm:
     def wrenches(self, problem: Problem, x: Array) -> Array:
         """Contact wrenches, (m, 6), of the variables x."""
         w_OC_C = np.zeros(6 * self.m)
-        w_OC_C[self.flat] = x[: self.aux_column] * self.scale(problem) * self.force_unit(problem)
+        unit = self.force_unit(problem)
+        w_OC_C[self.flat] = x[: self.aux_column] * problem.contact_set.scale * unit
         return w_OC_C.reshape(self.m, 6)
 
     def multipliers(self, problem: Problem, z: Array, utilisation: float = 1.0) -> Multipliers:
         """The dual variables z by the names of their constraints; parameters as in matrices."""
         z = z * (self.value_unit(problem) / self.force_unit(problem))
-        l = 0 if problem.joints is None else len(problem.joints.names)
-        f_n_min, f_n_max = np.zeros(self.m), np.zeros(self.m)
-        tau_min, tau_max = np.zeros(l), np.zeros(l)
-        f_n_min[self.preloaded] = z[self.f_n_min_rows]
-        f_n_max[self.limited] = z[self.f_n_max_rows]
-        tau_max[self.upper] = z[self.tau_max_rows]
-        tau_min[self.lower] = z[self.tau_min_rows]
-        flat = np.zeros(6 * self.m)
-        scaled = self.cone_variables
-        flat[self.flat[scaled]] = z[self.cone_rows] / self.scale(problem)[scaled]
+        named = np.zeros(self._named_ends[-1])
+        named[self._named] = z[self._named_rows]
+        equilibrium, cone, f_n_min, f_n_max, tau_min, tau_max = (
+            named[start:end] for start, end in pairwise(self._named_ends)
+        )
+        cone = cone.reshape(self.m, 6)
+        cone *= problem.contact_set.reciprocal
+        if self.objective is Objective.FRICTION_MARGIN:
+            cone[self.cone_contacts, N] *= utilisation
         match self.objective:
             case Objective.MAX_NORMAL_FORCE:
                 gradient = z[self.linear_rows]
@@ -288,24 +298,28 @@ class ConicForm:
                 gradient = np.zeros(0)
             case _:
                 gradient = -z[self.norm_rows.start + 1 : self.norm_rows.stop]
-        cone = flat.reshape(self.m, 6)
-        cone[self.cone_contacts, N] *= utilisation
+        return Multipliers(equilibrium, cone, f_n_min, f_n_max, tau_min, tau_max, gradient)
+
+    def _lay_out_multipliers(self, l: int, preloads: Array) -> None:
+        """Where each row's multiplier goes in one array of all named ones."""
+        ends = np.cumsum([0, 6, 6 * self.m, self.m, self.m, l, l])
+        self._named_ends = [int(end) for end in ends]
+        _, cone, f_n_min, f_n_max, tau_min, tau_max, _ = self._named_ends
         # A frictionless contact's cone is f_n >= 0: that is its preload row with f_n_min = 0.
-        for i in self.preloaded:
-            if (
-                len(problem.contacts[i].model.components) == 1
-                and problem.contacts[i].f_n_min == 0.0
-            ):
-                cone[i, N], f_n_min[i] = f_n_min[i], 0.0
-        return Multipliers(
-            equilibrium=z[self.equilibrium_rows],
-            cone=cone,
-            f_n_min=f_n_min,
-            f_n_max=f_n_max,
-            tau_min=tau_min,
-            tau_max=tau_max,
-            gradient=gradient,
+        contacts = self.preloaded
+        smooth = ~np.isin(contacts, self.cone_contacts) & (preloads[contacts] == 0.0)
+        self._named = np.concatenate(
+            [
+                np.arange(6),
+                np.where(smooth, cone + 6 * contacts + N, f_n_min + contacts),
+                f_n_max + self.limited,
+                tau_max + self.upper,
+                tau_min + self.lower,
+                cone + self.flat[self.cone_variables],
+            ]
         )
+        bounds = np.arange(self.tau_min_rows.stop)
+        self._named_rows = np.concatenate([bounds, np.arange(self.rows)[self.cone_rows]])
 
 
 def _diagonal(A: Array, rows: slice, columns: Array, value: float) -> None:

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import math
+from collections import Counter
 from dataclasses import dataclass
 from enum import StrEnum
-from functools import cached_property
+from functools import cached_property, lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -110,12 +111,97 @@ class Contact:
         return np.array([all_components[c] for c in self.model.components])
 
 
+class ContactSet:
+    """What follows from a tuple of contacts alone, as arrays.
+
+    Attributes:
+        hands: Indices of the hand contacts, in order.
+        hand_rows: The same as an index of arrays with one row per contact; a slice where it can be.
+        widths: Number of transmitted components of each contact.
+        starts: Where the components of each contact begin in the arrays below, (m + 1,).
+        flat: Positions of all transmitted components in flattened (m, 6) wrenches, (k,).
+        scale: Their scales, as in :attr:`Contact.scale`, (k,).
+        reciprocal: Their reciprocals, zero where nothing is transmitted, (m, 6).
+        friction: The same for the tangential components alone, (m, 6).
+        f_n_min, f_n_max: Bounds of the normal forces [N], (m,).
+        preload: The largest f_n_min [N].
+        largest_bound: The largest finite bound [N].
+        structure: What two sets share whose problems differ in numbers only.
+
+    Raises:
+        InvalidInputError: There are no contacts, or two of the same name.
+    """
+
+    def __init__(self, contacts: tuple[Contact, ...]) -> None:
+        check_names("contacts", tuple(c.name for c in contacts))
+        self.hands = tuple(i for i, c in enumerate(contacts) if c.role is Role.HAND)
+        in_order = self.hands == tuple(range(len(self.hands)))
+        self.hand_rows: slice | list[int] = slice(len(self.hands)) if in_order else list(self.hands)
+        self.widths = tuple(len(c.model.components) for c in contacts)
+        self.starts = np.cumsum([0, *self.widths])
+        self.flat = np.concatenate(
+            [6 * i + np.array(c.model.components) for i, c in enumerate(contacts)]
+        )
+        self.scale = np.concatenate([c.scale for c in contacts])
+        self.reciprocal = np.zeros((len(contacts), 6))
+        self.reciprocal.flat[self.flat] = 1.0 / self.scale
+        self.friction = self.reciprocal.copy()
+        self.friction[:, N] = 0.0
+        self.f_n_min = np.array([c.f_n_min for c in contacts])
+        self.f_n_max = np.array([c.f_n_max for c in contacts])
+        self.preload = float(self.f_n_min.max())
+        bounds = np.concatenate([self.f_n_min, self.f_n_max])
+        self.largest_bound = float(bounds[np.isfinite(bounds)].max())
+        # One string, for its hash is kept.
+        self.structure = " ".join(
+            f"{c.model}|{c.role}|{c.f_n_min > 0.0}|{math.isfinite(c.f_n_max)}" for c in contacts
+        )
+
+    @staticmethod
+    def of(contacts: tuple[Contact, ...]) -> ContactSet:
+        """The set of a tuple: made once, for the contacts of a run are one tuple at every tick."""
+        return _contact_set(_Same(contacts))
+
+
+class _Same:
+    """A tuple as a key that is compared by identity: contacts are frozen, but slow to hash."""
+
+    __slots__ = ("contacts",)
+
+    def __init__(self, contacts: tuple[Contact, ...]) -> None:
+        self.contacts = contacts
+
+    def __hash__(self) -> int:
+        return id(self.contacts)
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, _Same) and self.contacts is other.contacts
+
+
+@lru_cache(maxsize=64)
+def _contact_set(key: _Same) -> ContactSet:
+    return ContactSet(key.contacts)
+
+
+def check_names(field: str, names: tuple[str, ...]) -> None:
+    """Refuses an empty set of names, and names that occur more than once."""
+    if not names:
+        raise InvalidInputError(field, "an empty set", "at least one")
+    if len(set(names)) < len(names):
+        repeated = sorted(name for name, count in Counter(names).items() if count > 1)
+        raise InvalidInputError(field, f"{', '.join(repeated)} more than once", "unique names")
+
+
+# S(p) is linear in p: row k holds S(e_k), flattened.
+_SKEW = np.array(
+    [[0, 0, 0, 0, 0, -1, 0, 1, 0], [0, 0, 1, 0, 0, 0, -1, 0, 0], [0, -1, 0, 1, 0, 0, 0, 0, 0]],
+    dtype=np.float64,
+)
+
+
 def skew(p: Array) -> Array:
     """Cross-product matrices S(p) of vectors p, (..., 3) -> (..., 3, 3), with S(p) z = p x z."""
-    S = np.zeros((*p.shape[:-1], 3, 3))
-    S[..., 0, 1], S[..., 0, 2], S[..., 1, 2] = -p[..., 2], p[..., 1], -p[..., 0]
-    S[..., 1, 0], S[..., 2, 0], S[..., 2, 1] = p[..., 2], -p[..., 1], p[..., 0]
-    return S
+    return (p @ _SKEW).reshape(*p.shape, 3)
 
 
 def grasp_maps(R_OC: Array, p_OC_O: Array) -> Array:
@@ -130,7 +216,7 @@ def grasp_maps(R_OC: Array, p_OC_O: Array) -> Array:
     """
     G = np.zeros((len(R_OC), 6, 6))
     G[:, :3, :3] = R_OC
-    G[:, 3:, :3] = skew(p_OC_O) @ R_OC
+    np.matmul(skew(p_OC_O), R_OC, out=G[:, 3:, :3])
     G[:, 3:, 3:] = R_OC
     return G
 
@@ -146,10 +232,7 @@ def utilisation(contacts: tuple[Contact, ...], w_OC_C: Array) -> Array:
         (..., m); 0 where the contact is unloaded or frictionless, infinite for a tangential force
         without a normal force.
     """
-    inverse = np.zeros((len(contacts), 6))
-    for i, contact in enumerate(contacts):
-        inverse[i, list(contact.model.components[1:])] = 1.0 / contact.scale[1:]
-    tangential = np.linalg.norm(w_OC_C * inverse, axis=-1)
+    tangential = np.linalg.norm(w_OC_C * ContactSet.of(contacts).friction, axis=-1)
     normal = np.maximum(w_OC_C[..., N], 0.0)
     with np.errstate(divide="ignore", invalid="ignore"):
         return np.where(tangential == 0.0, 0.0, tangential / normal)

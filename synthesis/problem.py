@@ -2,17 +2,20 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+import math
+from dataclasses import dataclass, field
 from enum import StrEnum
 from functools import cached_property
+from operator import le
 
 import numpy as np
 
-from synthesis.contact import Array, Contact, ContactModel, Role, grasp_maps
+from synthesis.contact import Array, Contact, ContactModel, ContactSet, check_names, grasp_maps
 from synthesis.errors import InvalidInputError
 
 # Rotation matrices come from integrated quaternions: 1e-6 passes those, and nothing mis-scaled.
 _ROTATION_TOLERANCE = 1e-6
+_IDENTITY = np.eye(3)
 
 
 class Objective(StrEnum):
@@ -66,18 +69,19 @@ class Joints:
     tau_max: Array
 
     def __post_init__(self) -> None:
-        _check_names("joints.names", self.names)
+        check_names("joints.names", self.names)
         joints = len(self.names)
         if self.J_C.ndim != 3 or self.J_C.shape[1:] != (6, joints):
             raise InvalidInputError("joints.J_C", f"shape {self.J_C.shape}", f"(n, 6, {joints})")
-        for field in ("tau_g", "tau_min", "tau_max"):
-            _check_shape(f"joints.{field}", getattr(self, field), (joints,))
-        for field in ("J_C", "tau_g"):
-            _check_finite(f"joints.{field}", getattr(self, field))
-        ordered = (
-            (self.tau_min <= self.tau_max) & (self.tau_min < np.inf) & (self.tau_max > -np.inf)
-        )
-        if not ordered.all():
+        _check_shape("joints.tau_g", self.tau_g, (joints,))
+        _check_shape("joints.tau_min", self.tau_min, (joints,))
+        _check_shape("joints.tau_max", self.tau_max, (joints,))
+        _check_finite("joints.J_C", self.J_C)
+        _check_finite("joints.tau_g", self.tau_g)
+        low, high = self.tau_min.tolist(), self.tau_max.tolist()
+        if not (all(map(le, low, high)) and max(low) < math.inf and min(high) > -math.inf):
+            ordered = self.tau_min <= self.tau_max
+            ordered &= (self.tau_min < np.inf) & (self.tau_max > -np.inf)
             worst = int(np.argmin(ordered))
             raise InvalidInputError(
                 f"joints.tau_min[{self.names[worst]}]",
@@ -106,6 +110,7 @@ class Problem:
         w_ext_O: External wrench on the object, weight included, in the object frame [N, N·m], (6,).
         joints: The joints behind the hand contacts; None leaves (15) and (16) out.
         objective: Phi.
+        contact_set: What follows from the contacts alone, as arrays; not to be given.
 
     Raises:
         InvalidInputError: A field is non-finite, mis-shaped or senseless.
@@ -117,20 +122,23 @@ class Problem:
     w_ext_O: Array
     joints: Joints | None = None
     objective: Objective = Objective.MAX_NORMAL_FORCE
+    contact_set: ContactSet = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
         m = len(self.contacts)
-        _check_names("contacts", tuple(c.name for c in self.contacts))
+        object.__setattr__(self, "contact_set", ContactSet.of(self.contacts))
         _check_shape("R_OC", self.R_OC, (m, 3, 3))
         _check_shape("p_OC_O", self.p_OC_O, (m, 3))
         _check_shape("w_ext_O", self.w_ext_O, (6,))
-        for field in ("R_OC", "p_OC_O", "w_ext_O"):
-            _check_finite(field, getattr(self, field))
+        _check_finite("R_OC", self.R_OC)
+        _check_finite("p_OC_O", self.p_OC_O)
+        _check_finite("w_ext_O", self.w_ext_O)
         self._check_rotations()
         if not self.hands and self.objective is not Objective.FRICTION_MARGIN:
             raise InvalidInputError("contacts", "no hand", f"a hand, as {self.objective} asks")
-        frictionless = all(c.model is ContactModel.FRICTIONLESS for c in self.contacts)
-        if frictionless and self.objective is Objective.FRICTION_MARGIN:
+        if self.objective is Objective.FRICTION_MARGIN and all(
+            c.model is ContactModel.FRICTIONLESS for c in self.contacts
+        ):
             raise InvalidInputError(
                 "contacts", "no friction", f"friction, as {self.objective} asks"
             )
@@ -140,9 +148,17 @@ class Problem:
             self._check_joints(self.joints)
 
     def _check_rotations(self) -> None:
-        deviation = np.abs(self.R_OC @ self.R_OC.transpose(0, 2, 1) - np.eye(3)).max(axis=(1, 2))
-        proper = (deviation <= _ROTATION_TOLERANCE) & (np.linalg.det(self.R_OC) > 0.0)
-        if not proper.all():
+        deviation = self.R_OC @ self.R_OC.transpose(0, 2, 1) - _IDENTITY
+        determinant = np.linalg.det(self.R_OC)
+        # The root of the sum of squares is the quicker, and an upper, bound on the largest one.
+        if not (
+            np.vdot(deviation, deviation) <= _ROTATION_TOLERANCE**2
+            and min(determinant.tolist()) > 0.0
+        ):
+            proper = np.abs(deviation).max(axis=(1, 2)) <= _ROTATION_TOLERANCE
+            proper &= determinant > 0.0
+            if proper.all():
+                return
             worst = self.contacts[int(np.argmin(proper))].name
             raise InvalidInputError(
                 f"R_OC[{worst}]", "a matrix that is no rotation", "orthonormal with determinant +1"
@@ -166,36 +182,38 @@ class Problem:
                     f"finite with tau_min < 0 < tau_max, as objective {self.objective} asks",
                 )
 
-    @cached_property
+    @property
     def hands(self) -> tuple[int, ...]:
         """Indices of the hand contacts, in the order of the Jacobians."""
-        return tuple(i for i, c in enumerate(self.contacts) if c.role is Role.HAND)
+        return self.contact_set.hands
 
     @cached_property
     def G(self) -> Array:
         """Grasp maps of all contacts, (m, 6, 6)."""
         return grasp_maps(self.R_OC, self.p_OC_O)
 
+    @cached_property
+    def load(self) -> float:
+        """The largest load: external wrench, preload and, if torque counts, gravity [N or N·m]."""
+        load = max(float(np.abs(self.w_ext_O).max()), self.contact_set.preload)
+        if self.joints is not None and self.objective.needs_joints:
+            load = max(load, float(np.abs(self.joints.tau_g).max()))
+        return load
+
     def torque(self, w_OC_C: Array) -> Array:
         """Joint torques [N·m or N], (l,), that go with contact wrenches, (m, 6): (15)."""
         if self.joints is None:
             return np.zeros(0)
-        return np.einsum("nkl,nk->l", self.joints.J_C, w_OC_C[list(self.hands)]) + self.joints.tau_g
+        J = self.joints.J_C.reshape(-1, len(self.joints.names))
+        return w_OC_C[self.contact_set.hand_rows].ravel() @ J + self.joints.tau_g
 
 
-def _check_names(field: str, names: tuple[str, ...]) -> None:
-    if not names:
-        raise InvalidInputError(field, "an empty set", "at least one")
-    repeated = sorted({name for name in names if names.count(name) > 1})
-    if repeated:
-        raise InvalidInputError(field, f"{', '.join(repeated)} more than once", "unique names")
-
-
-def _check_shape(field: str, array: Array, shape: tuple[int, ...]) -> None:
+def _check_shape(name: str, array: Array, shape: tuple[int, ...]) -> None:
     if np.shape(array) != shape:
-        raise InvalidInputError(field, f"shape {np.shape(array)}", f"shape {shape}")
+        raise InvalidInputError(name, f"shape {np.shape(array)}", f"shape {shape}")
 
 
-def _check_finite(field: str, array: Array) -> None:
-    if not np.isfinite(array).all():
-        raise InvalidInputError(field, "a value that is NaN or infinite", "finite numbers")
+def _check_finite(name: str, array: Array) -> None:
+    # A finite sum of squares proves it at once; where it is not, numbers may be merely large.
+    if not math.isfinite(np.vdot(array, array)) and not np.isfinite(array).all():
+        raise InvalidInputError(name, "a value that is NaN or infinite", "finite numbers")

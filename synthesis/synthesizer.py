@@ -1,5 +1,14 @@
 r"""Solves contact force synthesis problems on Clarabel, one prebuilt solver per structure.
 
+Torque limits are most of (17)'s numbers and bind seldom. So a problem is first attempted without
+them: over a larger set the optimum is no worse, so that one which happens to keep (16) is optimal
+for (17), with multipliers of zero for (16); and multipliers that prove the relaxed problem
+infeasible prove (17) so. The attempt also goes without iterative refinement: Clarabel stops by
+residuals that it computes from the data, whatever the accuracy of its steps. It counts if it is
+``Solved`` to the full tolerance, balances the object and keeps (16); or if its proof of
+infeasibility holds. On anything else the whole problem is solved, carefully. The friction margin,
+which squeezes until a limit binds, is not attempted.
+
 The friction margin, the smallest largest utilisation :math:`\|f_t\| / f_n` of all contacts, is a
 ratio and so quasi-convex. It is found by Dinkelbach's method for the largest of several ratios
 (Crouzeix, Ferland, Schaible 1985): at the utilisation :math:`s` of the last forces solve
@@ -16,7 +25,9 @@ keeps it within the cone at s without letting it hold the others back.
 
 from __future__ import annotations
 
-from collections.abc import Hashable
+import math
+import time
+from collections.abc import Callable, Hashable
 from dataclasses import dataclass, replace
 
 import clarabel
@@ -28,9 +39,10 @@ from synthesis.conic import ConicForm, structure
 from synthesis.contact import Array, ContactModel, N
 from synthesis.errors import InfeasibleError, SolverError, UnboundedError
 from synthesis.problem import Objective, Problem
-from synthesis.solution import Solution, certificate
+from synthesis.solution import Multipliers, Solution, certificate
 
-# Feasibility and gap, relative: well under the 1e-6 to which the torque matters. On degenerate
+# Feasibility and gap, relative to the load: 1e-6 of an objective that is a thousandth of the load,
+# as near the balance point, at the cost of one iteration more than 1e-7 takes. On degenerate
 # problems the linear algebra stalls a little above the first; the second is accepted, too.
 TOLERANCE = 1e-9
 _ACCEPTED_TOLERANCE = 1e-8
@@ -43,6 +55,13 @@ _PROVEN = ("PrimalInfeasible", "DualInfeasible")
 _FALLBACK_REGULARISATIONS = (1e-12, 1e-6)
 # The solver's feasibility is relative to its largest number, which may be an absurd bound.
 _WORST_IMBALANCE = 1e-6
+# What an attempt must keep, where there is a second chance.
+_IMBALANCE = 1e-8
+# An attempt's proof of infeasibility must hold for forces up to this many times the load [-].
+_FARTHEST = 1e4
+# After an attempt that failed, so many problems of the structure are solved with all rows at once:
+# torque limits that bind at one tick bind at the next, and a futile attempt costs a third again.
+_REST = 16
 # Normal forces below this fraction of the largest force count as none: their cones are noise.
 _LOADED = 1e-6
 
@@ -72,7 +91,8 @@ class Synthesizer:
     """
 
     def __init__(self) -> None:
-        self._compiled: dict[Hashable, _Compiled] = {}
+        self._attempts: dict[Hashable, _Program] = {}
+        self._programs: dict[Hashable, _Program] = {}
 
     def solve(self, problem: Problem) -> Solution:
         """Solves (17).
@@ -82,13 +102,29 @@ class Synthesizer:
             UnboundedError: The objective improves without limit.
             SolverError: The solver gave neither.
         """
-        key = structure(problem)
-        compiled = self._compiled.get(key)
-        if compiled is None:
-            compiled = self._compiled[key] = _Compiled(problem)
         if problem.objective is Objective.FRICTION_MARGIN:
-            return _largest_margin(compiled, problem)
-        return compiled.solve(problem)
+            return _largest_margin(self._solve, problem)
+        quick = self._program(self._attempts, problem, careful=False)
+        if quick.rest:
+            quick.rest -= 1
+        else:
+            solution = quick.attempt(problem)
+            if solution is not None:
+                return solution
+            quick.rest = _REST
+        return self._solve(problem, _AS_IT_STANDS)
+
+    def _solve(self, problem: Problem, parameters: _Parameters) -> Solution:
+        """One careful solve; for the friction margin the value is lambda."""
+        return self._program(self._programs, problem, careful=True).solve(problem, parameters)
+
+    @staticmethod
+    def _program(programs: dict[Hashable, _Program], problem: Problem, careful: bool) -> _Program:
+        key = structure(problem, torque_limits=careful)
+        program = programs.get(key)
+        if program is None:
+            program = programs[key] = _Program(problem, careful)
+        return program
 
 
 @dataclass(frozen=True)
@@ -99,52 +135,94 @@ class _Parameters:
     d: Array | None = None
 
 
-class _Compiled:
-    """A Clarabel solver for one structure; its sparsity holds for all numbers."""
+_AS_IT_STANDS = _Parameters()
 
-    def __init__(self, problem: Problem) -> None:
-        self.form = ConicForm(problem)
+
+class _Program:
+    """A Clarabel solver for one structure; its sparsity holds for all numbers.
+
+    Attributes:
+        form: The structure.
+        rest: How many problems are yet to be left to the careful program.
+    """
+
+    def __init__(self, problem: Problem, careful: bool) -> None:
+        """Builds the solver.
+
+        Args:
+            problem: Any problem of the structure.
+            careful: Whether with all rows and iterative refinement, for :meth:`solve`; else without
+                the torque limits and without refinement, for :meth:`attempt`.
+        """
+        self.rest = 0
+        self.form = ConicForm(problem, torque_limits=careful)
         self._pattern = sp.csc_matrix(self.form.sparsity(problem), dtype=np.float64)
-        self._rows = self._pattern.indices
-        self._columns = np.repeat(np.arange(self.form.columns), np.diff(self._pattern.indptr))
+        rows = self._pattern.indices
+        columns = np.repeat(np.arange(self.form.columns), np.diff(self._pattern.indptr))
+        self._entries = rows * self.form.columns + columns
+        settings = solver_settings()
+        settings.iterative_refinement_enable = careful
         A, b = self.form.matrices(problem)
-        self._solver = self._build(A[self._rows, self._columns], b, solver_settings())
+        self._solver = self._build(A.take(self._entries), b, settings)
 
-    def solve(self, problem: Problem, parameters: _Parameters = _Parameters()) -> Solution:
-        """One conic solve; for the friction margin the value is lambda."""
-        A, b = self.form.matrices(problem, parameters.s, parameters.d)
-        scale = self.form.row_scale(b)
-        result = self._run(A * scale[:, None], b * scale)
-        multipliers = self.form.multipliers(problem, np.array(result.z) * scale, parameters.s)
+    def attempt(self, problem: Problem) -> Solution | None:
+        """Solves without the torque limits; None where that is not the answer to (17)."""
+        parameters = _AS_IT_STANDS
+        started = time.perf_counter()
+        A, b, scale = self._scaled(problem, parameters)
+        result = self._update_and_solve(A, b)
+        status = str(result.status)
+        if status == "PrimalInfeasible":
+            proof = certificate(problem, self._multipliers(problem, result, scale, parameters))
+            if proof.proves(_FARTHEST * self.form.force_unit(problem)):
+                raise InfeasibleError(proof)
+        if status != "Solved":
+            return None
+        x = np.array(result.x)
+        if not self._balances(x, A, b, _IMBALANCE):
+            return None
+        solution = self._solution(problem, result, x, scale, parameters, started)
+        joints, tau = problem.joints, solution.tau
+        if joints is None or ((tau <= joints.tau_max) & (tau >= joints.tau_min)).all():
+            return solution
+        return None
+
+    def solve(self, problem: Problem, parameters: _Parameters) -> Solution:
+        """Solves all of (17), with differently set solvers where the prebuilt one stalls."""
+        started = time.perf_counter()
+        A, b, scale = self._scaled(problem, parameters)
+        result = self._decided(A, b)
         match str(result.status):
             case "PrimalInfeasible":
+                multipliers = self._multipliers(problem, result, scale, parameters)
                 raise InfeasibleError(certificate(problem, multipliers))
             case "DualInfeasible":
                 raise UnboundedError(problem.objective)
-        x = np.array(result.x)
-        w_OC_C = self.form.wrenches(problem, x)
-        return Solution(
-            problem=problem,
-            value=self.form.value(problem, x),
-            w_OC_C=w_OC_C,
-            tau=problem.torque(w_OC_C),
-            multipliers=multipliers,
-            iterations=result.iterations,
-            solve_s=result.solve_time,
-        )
+        return self._solution(problem, result, np.array(result.x), scale, parameters, started)
 
-    def _run(self, A: Array, b: Array) -> clarabel.DefaultSolution:
-        """Solves with the prebuilt solver, or, where that stalls, with differently set ones."""
-        data = A[self._rows, self._columns]
-        self._solver.update(A=data, b=b)
-        result = self._solver.solve()
+    def _scaled(
+        self, problem: Problem, parameters: _Parameters
+    ) -> tuple[Array, Array, Array | float]:
+        A, b = self.form.matrices(problem, parameters.s, parameters.d)
+        if not self.form.has_loose_limits(problem):
+            return A, b, 1.0
+        scale = self.form.row_scale(b)
+        return A * scale[:, None], b * scale, scale
+
+    def _update_and_solve(self, A: Array, b: Array) -> clarabel.DefaultSolution:
+        # Clarabel reads lists three times as fast as arrays.
+        self._solver.update(A=A.take(self._entries).tolist(), b=b.tolist())
+        return self._solver.solve()
+
+    def _decided(self, A: Array, b: Array) -> clarabel.DefaultSolution:
+        result = self._update_and_solve(A, b)
         if self._decides(result, A, b):
             return result
         for regularisation in _FALLBACK_REGULARISATIONS:
             settings = solver_settings()
             settings.equilibrate_enable = False
             settings.static_regularization_constant = regularisation
-            result = self._build(data, b, settings).solve()
+            result = self._build(A.take(self._entries), b, settings).solve()
             if self._decides(result, A, b):
                 return result
         raise SolverError(str(result.status))
@@ -154,9 +232,41 @@ class _Compiled:
         status = str(result.status)
         if status not in SOLVED:
             return status in _PROVEN
-        x, rows = np.array(result.x), self.form.equilibrium_rows
-        largest = max(1.0, float(np.abs(x[: self.form.aux_column]).max()))
-        return bool(np.abs(A[rows] @ x - b[rows]).max() <= _WORST_IMBALANCE * largest)
+        return self._balances(np.array(result.x), A, b, _WORST_IMBALANCE)
+
+    def _balances(self, x: Array, A: Array, b: Array, tolerance: float) -> bool:
+        rows = self.form.equilibrium_rows
+        imbalance, forces = A[rows] @ x - b[rows], x[: self.form.aux_column]
+        return math.sqrt(imbalance @ imbalance) <= tolerance * max(1.0, math.sqrt(forces @ forces))
+
+    def _multipliers(
+        self,
+        problem: Problem,
+        result: clarabel.DefaultSolution,
+        scale: Array | float,
+        parameters: _Parameters,
+    ) -> Multipliers:
+        return self.form.multipliers(problem, np.array(result.z) * scale, parameters.s)
+
+    def _solution(
+        self,
+        problem: Problem,
+        result: clarabel.DefaultSolution,
+        x: Array,
+        scale: Array | float,
+        parameters: _Parameters,
+        started: float,
+    ) -> Solution:
+        w_OC_C = self.form.wrenches(problem, x)
+        return Solution(
+            problem=problem,
+            value=self.form.value(problem, x),
+            w_OC_C=w_OC_C,
+            tau=problem.torque(w_OC_C),
+            multipliers=self._multipliers(problem, result, scale, parameters),
+            iterations=result.iterations,
+            solve_s=time.perf_counter() - started,
+        )
 
     def _build(
         self, data: Array, b: Array, settings: clarabel.DefaultSettings
@@ -169,10 +279,12 @@ class _Compiled:
         return clarabel.DefaultSolver(P, q, A, b, self.form.clarabel_cones, settings)
 
 
-def _largest_margin(compiled: _Compiled, problem: Problem) -> Solution:
+def _largest_margin(
+    solve: Callable[[Problem, _Parameters], Solution], problem: Problem
+) -> Solution:
     """Dinkelbach's method; every iterate is feasible, so that stopping early costs margin only."""
-    unit = compiled.form.force_unit(problem)
-    best = last = compiled.solve(problem)
+    unit = problem.load or 1.0
+    best = last = solve(problem, _AS_IT_STANDS)
     iterations, solve_s = last.iterations, last.solve_s
     s, loaded = _largest_utilisation(last, unit)
     for _ in range(_MARGIN_SOLVES):
@@ -180,7 +292,7 @@ def _largest_margin(compiled: _Compiled, problem: Problem) -> Solution:
             break
         slack = np.where(loaded, last.w_OC_C[:, N], 0.0)
         try:
-            last = compiled.solve(problem, _Parameters(s=s, d=slack))
+            last = solve(problem, _Parameters(s=s, d=slack))
         except InfeasibleError:  # At s the cones are left by noise alone.
             break
         iterations += last.iterations
