@@ -37,10 +37,7 @@ class References:
         ticks = round(path.schedule.total_s / timestep)
         # A plant's clock adds up its steps, with their rounding.
         self._times = np.concatenate([[0.0], np.cumsum(np.full(ticks, timestep))])
-        asked = path.schedule.at(self._times)
-        self._phase, self._tilt, self._grip = (
-            column.tolist() for column in (asked.phase, asked.tilt, asked.grip)
-        )
+        self._asked = asked = path.schedule.at(self._times)
         self._q = np.empty((len(self._times), len(path.start)))
         self._qd = np.empty_like(self._q)
         for phase in range(len(path.schedule.phases)):
@@ -51,10 +48,13 @@ class References:
     def at(self, t: float) -> Target:
         """References at a time [s]; read off at ticks, computed between them and after the end."""
         row = round(t / self._timestep)
-        if row < len(self._phase) and self._times[row] == t:
-            return Target(
-                self._phase[row], self._tilt[row], self._grip[row], self._q[row], self._qd[row]
-            )
-        asked = self._path.schedule.at(t)
-        q, slope = self._path.at(int(asked.phase), asked.progress)
-        return Target(int(asked.phase), float(asked.tilt), float(asked.grip), q, slope * asked.rate)
+        if row < len(self._times) and self._times[row] == t:
+            asked = self._asked
+            phase, tilt, grip = asked.phase[row], asked.tilt[row], asked.grip[row]
+            q, qd = self._q[row], self._qd[row]
+        else:
+            asked = self._path.schedule.at(t)
+            phase, tilt, grip = asked.phase, asked.tilt, asked.grip
+            q, slope = self._path.at(int(phase), asked.progress)
+            qd = slope * asked.rate
+        return Target(int(phase), float(tilt), float(grip), q, qd)
