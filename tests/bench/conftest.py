@@ -99,6 +99,16 @@ def timed(benchmark, table):
     return run
 
 
+def wall_times(function, arguments):
+    """Wall time of one call for each of many arguments [s]."""
+    times = []
+    for args in arguments:
+        started = time.perf_counter()
+        function(*args)
+        times.append(time.perf_counter() - started)
+    return times
+
+
 def ratio(first, second):
     """Median time of one function over that of another, each a pair of function and arguments.
 
@@ -107,10 +117,7 @@ def ratio(first, second):
     times = [], []
     for start in range(0, len(first[1]), TURN):
         for samples, (function, arguments) in zip(times, (first, second), strict=True):
-            for args in arguments[start : start + TURN]:
-                started = time.perf_counter()
-                function(*args)
-                samples.append(time.perf_counter() - started)
+            samples += wall_times(function, arguments[start : start + TURN])
     return float(np.median(times[0]) / np.median(times[1]))
 
 

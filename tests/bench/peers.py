@@ -208,7 +208,8 @@ class Pyramids:
     """Linear constraints in the place of the cones, on a QP solver through qpsolvers.
 
     Inner approximation: the polygon of so many facets inscribed in the circle of tangential forces;
-    with torsion its hull with the two poles, so twice as many facets.
+    with torsion its hull with the two poles, so twice as many facets. Corners lie on the contact
+    axes, along which the forces here mostly act: that flatters the pyramids.
     """
 
     def __init__(self, problems, facets, solver):
