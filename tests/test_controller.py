@@ -17,6 +17,7 @@ from sim.schedule import Schedule
 from sim.settings import Control, controllers
 from sim.statics import Statics
 from synthesis import InvalidInputError, Objective, Synthesizer
+from synthesis.contact import N
 
 BOX = scenario("box-tilt")
 CONTROL = replace(BOX.control, solve_every=1)
@@ -197,7 +198,9 @@ def test_it_holds_the_last_forces_and_says_so_when_there_is_no_solution():
     # It recovers as soon as there is one.
     again = it.command(measured(80.0, GRIPPED_S))
     assert not again.failed
-    np.testing.assert_allclose(again.w_OC_C, upright.w_OC_C, rtol=0, atol=1e-6)
+    np.testing.assert_allclose(again.w_OC_C[:, N], upright.w_OC_C[:, N], rtol=0, atol=1e-6)
+    # What the edge's ends push against each other is free, and depends on what was solved before.
+    np.testing.assert_allclose(again.w_OC_C, upright.w_OC_C, rtol=0, atol=1e-3)
 
 
 def test_the_true_weight_has_a_solution_at_the_same_tilts():

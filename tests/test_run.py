@@ -19,6 +19,7 @@ from sim.run import Request, execute, markdown, resolved_config
 from sim.settings import Phase, stretched
 
 # The first 5 deg of the box tilt, which passes: 1.9 s of simulated time.
+BLOCK = 250  # steps that the loop hands over at a time
 PHASES = (
     Phase("touch", 0.2, tilt=0.0, gap=0.0, grip=0.0),
     Phase("grip", 0.4, tilt=0.0, gap=0.0, grip=1.0),
@@ -119,7 +120,7 @@ def test_the_written_report_is_the_returned_one(result, folder):
 
 def test_progress_counts_up_to_all_steps(result, progress):
     assert progress[-1] == (1900, 1900)
-    assert [done for done, _ in progress] == list(range(100, 1901, 100))
+    assert [done for done, _ in progress] == [*range(BLOCK, 1900, BLOCK), 1900]
 
 
 def test_the_text_of_the_verdict_holds_verdict_contacts_and_failures(result):
@@ -152,14 +153,14 @@ def test_a_signal_ends_the_run_after_the_present_block_with_a_complete_record(tm
     before = [signal.getsignal(n) for n in (signal.SIGINT, signal.SIGTERM)]
 
     def stop(done, total):
-        if done == 300:
+        if done == 2 * BLOCK:
             os.kill(os.getpid(), number)
 
     interrupted = execute(request(out=tmp_path), stop)
     assert interrupted.report.verdict is Verdict.INTERRUPTED
     # The signal arrives at once, or while the block that follows is made.
     steps = len(interrupted.trace)
-    assert steps in (300, 400)
+    assert steps in (2 * BLOCK, 3 * BLOCK)
     when = f"{1e-3 * steps:.2f} s"
     assert interrupted.report.failures == (f"The run was interrupted at {when}.",)
     assert strict_json(tmp_path / "report.json")["verdict"] == "interrupted"
@@ -183,7 +184,7 @@ def blow_up(monkeypatch, step):
     monkeypatch.setattr(Plant, "step", stepped)
 
 
-@pytest.mark.parametrize("step", [250, 300, 399, 1])
+@pytest.mark.parametrize("step", [BLOCK, BLOCK + 50, 2 * BLOCK - 1, 1])
 def test_a_diverged_run_keeps_every_step_before_and_says_when(monkeypatch, tmp_path, result, step):
     blow_up(monkeypatch, step)
     diverged = execute(request(seed=4, out=tmp_path))
@@ -201,13 +202,13 @@ def test_a_diverged_run_keeps_every_step_before_and_says_when(monkeypatch, tmp_p
 
 
 def test_the_loop_raises_only_after_it_has_handed_over_the_last_rows(monkeypatch):
-    blow_up(monkeypatch, 250)
+    blow_up(monkeypatch, 2 * BLOCK + 50)
     loop, blocks = ClosedLoop(SCENARIO, SCENARIO.control), []
-    with pytest.raises(DivergedError, match=r"diverged at 0\.250 s"):
+    with pytest.raises(DivergedError, match=r"diverged at 0\.550 s"):
         for block in loop.run():
             blocks.append(len(block))
-    assert blocks == [100, 100, 50]
-    assert loop.steps == 250
+    assert blocks == [BLOCK, BLOCK, 50]
+    assert loop.steps == 2 * BLOCK + 50
 
 
 def test_a_run_that_does_not_run_away_does_not_diverge(monkeypatch):
