@@ -10,7 +10,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from datetime import datetime
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Protocol
+from typing import TYPE_CHECKING, Annotated
 
 import tyro
 
@@ -180,10 +180,6 @@ Command = (
     | Annotated[Capacity, tyro.conf.subcommand("capacity")]
     | Annotated[Reproduce, tyro.conf.subcommand("reproduce")]
 )
-
-
-class _Executable(Protocol):
-    def execute(self) -> int: ...
 
 
 def main(arguments: Sequence[str] | None = None) -> int:

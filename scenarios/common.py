@@ -65,9 +65,7 @@ def new_folder(out: Path) -> Path:
     Raises:
         InvalidInputError: It is not empty, or cannot be a folder.
     """
-    nearest = next(path for path in (out, *out.absolute().parents) if path.exists())
-    if not nearest.is_dir() or (out.exists() and any(out.iterdir())):
-        from synthesis.errors import InvalidInputError
+    from sim.files import check_new_folder
 
-        raise InvalidInputError("--out", str(out), "a new or empty folder")
+    check_new_folder("--out", out)
     return out

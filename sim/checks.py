@@ -23,6 +23,12 @@ def not_negative(field: str, value: float) -> None:
         raise InvalidInputError(field, value, "a finite number >= 0")
 
 
+def finite(field: str, vector: Sequence[float]) -> None:
+    """Refuses a vector with a number that is NaN or infinite."""
+    if not all(math.isfinite(x) for x in vector):
+        raise InvalidInputError(field, vector, "finite numbers")
+
+
 def whole(field: str, value: object, least: int) -> None:
     """Refuses what is not an integer of at least ``least``."""
     if not isinstance(value, int) or isinstance(value, bool) or value < least:

@@ -139,9 +139,13 @@ def relaxed(problem: Problem, share: float) -> dict[str, Problem]:
     joints = problem.joints
     for k, name in enumerate(joints.names if joints else ()):
         assert joints is not None
-        factor = np.ones(len(joints.names))
-        factor[k] += share
-        stronger = replace(joints, tau_min=factor * joints.tau_min, tau_max=factor * joints.tau_max)
+        more = np.zeros(len(joints.names))
+        more[k] = share
+        stronger = replace(
+            joints,
+            tau_min=joints.tau_min - more * np.abs(joints.tau_min),
+            tau_max=joints.tau_max + more * np.abs(joints.tau_max),
+        )
         problems[f"torque limit of {name}"] = replace(problem, joints=stronger)
     return problems
 

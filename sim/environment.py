@@ -16,7 +16,11 @@ from sim.plant import Plant
 from sim.robot import RobotModel
 from sim.scenario import Scenario
 from sim.schedule import Schedule
+from synthesis import InvalidInputError
 from synthesis.contact import Array
+
+# How near to a whole number a number of steps must be.
+_WHOLE = 1e-6
 
 
 class TiltTask(control.Task):
@@ -93,12 +97,16 @@ def make_environment(
         control_timestep: Time between actions [s]; that of the synthesis if left out.
 
     Raises:
-        InvalidInputError: The time between actions is not a finite number > 0.
+        InvalidInputError: The time between actions is no multiple of the physics step.
         PathError: The arms cannot follow the path.
     """
     if control_timestep is None:
         control_timestep = scenario.control.solve_every * scenario.physics.timestep
     positive("control_timestep", control_timestep)
+    steps = control_timestep / scenario.physics.timestep
+    if abs(steps - round(steps)) > _WHOLE or round(steps) < 1:
+        valid = f"a multiple of the physics' {scenario.physics.timestep:g} s"
+        raise InvalidInputError("control_timestep", control_timestep, valid)
     plant = Plant(scenario)
     return control.Environment(
         plant.physics,

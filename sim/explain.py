@@ -259,7 +259,11 @@ def _words(change: Change, problem: Problem, gravity: Gravity) -> str:
         if kind is Kind.WEIGHT:
             return "any weight"
         return f"down to {factor:.3g} times and less" if factor else "down to nothing"
-    text = f"{'up' if factor > 1.0 else 'down'} to {factor:.4g} times"
+    # More friction, torque or grip, or less weight, is what an infeasible problem needs; the other
+    # way round it is what a feasible one bears.
+    needed = (factor > 1.0) is (kind is not Kind.WEIGHT)
+    more, less = ("at least", "at most") if needed else ("up to", "down to")
+    text = f"{more if factor > 1.0 else less} {factor:.4g} times"
     if kind is Kind.WEIGHT:
         text += f" ({factor * gravity.weight:.4g} N)"
     elif kind is Kind.FRICTION:

@@ -1,4 +1,4 @@
-"""JSON files as every part of fulcrum writes them."""
+"""Output files as every part of fulcrum writes them."""
 
 from __future__ import annotations
 
@@ -6,6 +6,15 @@ import json
 import math
 from pathlib import Path
 from typing import Any
+
+from synthesis import InvalidInputError
+
+
+def check_new_folder(field: str, out: Path) -> None:
+    """Refuses a folder that is not empty, or that cannot be made."""
+    nearest = next(path for path in (out, *out.absolute().parents) if path.exists())
+    if not nearest.is_dir() or (out.exists() and any(out.iterdir())):
+        raise InvalidInputError(field, str(out), "a new or empty folder")
 
 
 def write_json(path: Path, content: Any) -> None:

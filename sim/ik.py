@@ -133,10 +133,9 @@ class _Follower:
         still[[model.joint(name).dofadr[0] for name in scenario.robot.still]] = 1.0
         self._damping = mink.DampingTask(model, np.sqrt(_STILL_DAMPING) * still)
         self._radii = [float(model.geom(tip_geom(hand)).size[0]) for hand in scenario.hands]
-        self._motor_dofs = [int(model.actuator(i).trnid[0]) for i in range(model.nu)]
-        self._qd_max = np.array(
-            [velocity_limits(model)[model.joint(j).name] for j in range(model.njnt)]
-        )
+        self._motor_joints = [int(model.actuator(i).trnid[0]) for i in range(model.nu)]
+        speeds = velocity_limits(model)
+        self._qd_max = np.array([speeds[model.joint(j).name] for j in range(model.njnt)])
         q = np.array([scenario.robot.posture[model.joint(j).name] for j in range(model.njnt)])
         self._configuration.update(q)
         self._pose_object(0.0)
@@ -157,7 +156,7 @@ class _Follower:
         self._configuration.update(holding)
         planned += [self._follow(i) for i in range(touched + 1, len(phases))]
         progress, q = zip(*planned, strict=True)
-        low, high = self._model.jnt_range[self._motor_dofs].T
+        low, high = self._model.jnt_range[self._motor_joints].T
         every = np.concatenate(q)
         clearance = np.minimum(every - low, high - every).min(axis=0)
         return JointPath(self._schedule, tuple(progress), tuple(q), clearance)
@@ -172,7 +171,7 @@ class _Follower:
         for target, duration in zip(targets[1:], durations, strict=True):
             self._reach(target, float(duration))
             postures.append(self._configuration.q.copy())
-        q = np.array(postures)[:, self._motor_dofs]
+        q = np.array(postures)[:, self._motor_joints]
         return grid, q[::-1] if backwards else q
 
     def _targets(self, index: int) -> tuple[Array, list[_Target]]:

@@ -148,7 +148,8 @@ class Judge:
                 )
                 failures.append(_failure(trace, used, text))
             peak = float(np.abs(trace.w_command_C[:, i, N]).max())
-            if not lost.any() and contact.force_error_rms_n > limits.force_error * peak:
+            allowed_n = limits.force_error * peak
+            if peak > 0.0 and not lost.any() and contact.force_error_rms_n > allowed_n:
                 text = (
                     f"Contact {name} followed its commanded normal force only to "
                     f"{contact.force_error_rms_n:.3g} N RMS "

@@ -75,12 +75,12 @@ class Plant:
 
     def reset(self, q: Array) -> None:
         """Puts the robot at rest at joint angles q, (l,), and the object at its start."""
-        self.collisions.clear()
         with self.physics.reset_context():
             self.place(q)
 
     def place(self, q: Array) -> None:
-        """Sets the joint angles q, (l,), of a state that is being reset."""
+        """Sets the joint angles q, (l,), of a state that is being reset; forgets collisions."""
+        self.collisions.clear()
         self._data.qpos[self._q] = q
 
     def apply(self, tau: Array) -> None:

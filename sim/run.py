@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import signal
+import threading
 import time
 from collections.abc import Callable
 from importlib.metadata import version
@@ -12,7 +13,7 @@ from types import FrameType
 from typing import Any
 
 from sim.explain import Explanation, explain
-from sim.files import finite, write_json
+from sim.files import check_new_folder, finite, write_json
 from sim.judge import Judge
 from sim.loop import ClosedLoop, DivergedError
 from sim.monitor import ContactHistory, Monitor
@@ -22,7 +23,13 @@ from sim.report import Report, RunInfo
 from sim.scenario import Scenario
 from sim.settings import Control
 from sim.trace import Trace
-from synthesis import FulcrumError, InfeasibleError, Synthesizer
+from synthesis import (
+    FulcrumError,
+    InfeasibleError,
+    SolverError,
+    Synthesizer,
+    UnboundedError,
+)
 
 RECORDING, CONFIG, REPORT = "run.rrd", "config.json", "report.json"
 _PACKAGES = ("mujoco", "dm-control", "mink", "pin", "clarabel", "rerun-sdk", "numpy", "scipy")
@@ -85,13 +92,15 @@ def execute(request: Request, progress: Progress | None = None) -> Result:
 
     Raises:
         PathError: The arms cannot follow the path; nothing has moved.
-        InvalidInputError: The scenario contradicts itself.
+        InvalidInputError: The scenario contradicts itself, or the folder holds something.
         UnholdableError: The synthesis finds no forces somewhere on the path, and the request does
             not say to run anyway.
         DivergedError: The simulation diverged in its first step.
     """
     scenario, out = request.scenario, request.out
-    if not request.anyway:
+    if out is not None:
+        check_new_folder("out", out)
+    if request.control.feedforward and not request.anyway:
         _check_feasible(scenario, request.control)
     loop = ClosedLoop(scenario, request.control, seed=request.seed)
     monitor = Monitor(scenario)
@@ -144,12 +153,15 @@ def execute(request: Request, progress: Progress | None = None) -> Result:
 
 
 def _check_feasible(scenario: Scenario, control: Control) -> None:
+    """Refuses a path with a tilt at which a certificate proves that no forces exist."""
     problems, synthesizer = PathProblems(scenario, control), Synthesizer()
     for tilt in problems.tilts(_CHECK_DEG):
         try:
             synthesizer.solve(problems.problem(float(tilt)))
         except InfeasibleError:
             raise UnholdableError(explain(problems, float(tilt), synthesizer)) from None
+        except (SolverError, UnboundedError):
+            continue  # no proof: the controller copes with those as they come
 
 
 class _StopSignal:
@@ -160,6 +172,8 @@ class _StopSignal:
         self._previous: dict[signal.Signals, Any] = {}
 
     def __enter__(self) -> _StopSignal:
+        if threading.current_thread() is not threading.main_thread():
+            return self  # signals go to the main thread, and only it may say what they do
         for number in (signal.SIGINT, signal.SIGTERM):
             self._previous[number] = signal.signal(number, self._request)
         return self

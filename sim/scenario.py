@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, replace
 
-from sim.checks import axes, not_negative, positive
+from sim.checks import axes, finite, not_negative, positive
 from sim.settings import HOLD, REACH, STANDOFF, TILT, Control, Phase, Physics, Tolerances
 from synthesis import InvalidInputError
 
@@ -43,6 +43,12 @@ class Geom:
     rgba: tuple[float, float, float, float] = (0.6, 0.6, 0.6, 1.0)
     solid: bool = True
 
+    def __post_init__(self) -> None:
+        for size in self.size:
+            positive(f"{self.name}.size", size)
+        finite(f"{self.name}.pose", (*self.pose.position, *self.pose.quaternion))
+        finite(f"{self.name}.rgba", self.rgba)
+
 
 @dataclass(frozen=True)
 class Object:
@@ -66,6 +72,7 @@ class Object:
         positive(f"{self.name}.mass", self.mass)
         for moment in self.inertia:
             positive(f"{self.name}.inertia", moment)
+        finite(f"{self.name}.center_of_mass", self.center_of_mass)
 
 
 @dataclass(frozen=True)
@@ -118,6 +125,7 @@ class Hand:
 
     def __post_init__(self) -> None:
         axes(self.name, ("normal_O", self.normal_O), ("tangent_O", self.tangent_O))
+        finite(f"{self.name}.p_OC_O", self.p_OC_O)
         if not self.f_n_max > 0.0:
             raise InvalidInputError(f"{self.name}.f_n_max", self.f_n_max, "a number > 0")
 
@@ -146,6 +154,7 @@ class Support:
 
     def __post_init__(self) -> None:
         axes(self.name, ("normal_W", self.normal_W), ("tangent_W", self.tangent_W))
+        finite(f"{self.name}.p_OP_O", self.p_OP_O)
 
 
 @dataclass(frozen=True)

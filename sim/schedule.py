@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from sim.path import minimum_jerk
 from sim.scenario import Scenario
 from sim.settings import Phase
+from synthesis import InvalidInputError
 from synthesis.contact import Array, Mask
 
 
@@ -52,6 +53,9 @@ class Schedule:
         self._durations = np.array([phase.duration_s for phase in self.phases])
         self._shares_before = np.array([[phase.tilt, phase.grip] for phase in self._before])
         self._changes = [[p.tilt, p.grip] for p in self.phases] - self._shares_before
+        if np.count_nonzero(np.diff(np.concatenate([[0], self.held.astype(int)])) == 1) > 1:
+            valid = "at most one stretch with full grip: drift counts from where it began"
+            raise InvalidInputError("phases", [p.name for p in self.phases], valid)
 
     @property
     def total_s(self) -> float:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 
 from sim.checks import not_negative, positive, whole
 from synthesis import InvalidInputError, Objective
@@ -168,3 +168,7 @@ class Tolerances:
     spin_deg: float = 0.1
     utilisation: float = 0.95
     force_error: float = 0.02
+
+    def __post_init__(self) -> None:
+        for field in fields(self):
+            positive(f"tolerances.{field.name}", getattr(self, field.name))

@@ -1,17 +1,22 @@
 """Scenarios that contradict themselves, or what is shipped, are refused by name."""
 
 import math
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 
 import mujoco
+import numpy as np
 import pytest
 
 from assets import asset_path
 from scenarios import scenario
+from sim.environment import make_environment
 from sim.robot import pinocchio_model
+from sim.run import Request, execute
 from sim.scenario import Friction, Geom
 from sim.scene import compose
-from sim.settings import Physics
+from sim.schedule import Schedule
+from sim.settings import Physics, Tolerances, stretched
 from synthesis import InvalidInputError
 
 BOX = scenario("box-tilt")
@@ -225,3 +230,57 @@ def test_a_ball_joint_is_refused_by_name():
         pinocchio_model(mujoco.MjModel.from_xml_string(mjcf.format(kind)))
     with pytest.raises(InvalidInputError, match=r"^joint ball: got a ball joint; valid is a hinge"):
         pinocchio_model(mujoco.MjModel.from_xml_string(mjcf.format("ball")))
+
+
+@pytest.mark.parametrize("field", ["final_deg", "slip_mm", "utilisation", "force_error"])
+@pytest.mark.parametrize("value", [float("nan"), 0.0, -1.0])
+def test_a_tolerance_that_could_not_fail_or_pass_is_refused(field, value):
+    with pytest.raises(InvalidInputError, match=f"tolerances.{field}: got"):
+        Tolerances(**{field: value})
+
+
+def test_a_shape_that_is_no_shape_is_refused():
+    Geom("ball", "sphere", (0.1,))
+    for bad in ({"size": (float("nan"),)}, {"size": (-1.0,)}, {"rgba": (0.0, 0.0, 0.0, np.inf)}):
+        with pytest.raises(InvalidInputError, match="ball"):
+            Geom("ball", "sphere", **({"size": (0.1,)} | bad))
+
+
+def test_two_stretches_with_full_grip_are_refused():
+    again = (*BOX.phases, *BOX.phases[1:])
+    with pytest.raises(InvalidInputError, match=r"phases: .*one stretch with full grip"):
+        Schedule(replace(BOX, phases=again))
+    Schedule(BOX)
+
+
+def test_a_run_is_never_written_over_another(tmp_path):
+    (tmp_path / "run.rrd").write_text("somebody's")
+    with pytest.raises(InvalidInputError, match=r"out: .*new or empty folder"):
+        execute(Request(BOX, "margin", BOX.control, out=tmp_path))
+    assert (tmp_path / "run.rrd").read_text() == "somebody's"
+
+
+def test_a_run_off_the_main_thread_runs():
+    short = replace(BOX, phases=stretched(BOX.phases, 6.0))
+    with ThreadPoolExecutor(1) as pool:
+        report = pool.submit(execute, Request(short, "margin", short.control)).result().report
+    # A 6 s tilt slides by 0.12 mm: it ran, and was judged.
+    assert any("slid" in failure for failure in report.failures)
+
+
+def test_time_between_actions_must_be_whole_steps():
+    with pytest.raises(InvalidInputError, match=r"control_timestep: .*multiple"):
+        make_environment(BOX, control_timestep=0.0015)
+
+
+def test_a_new_episode_knows_nothing_of_the_last_one_s_collisions():
+    environment = make_environment(BOX, control_timestep=0.02)
+    plant = environment.task._plant
+    inwards = np.zeros(environment.action_spec().shape)
+    inwards[plant.joints.index("right_s0")] = 50.0
+    environment.reset()
+    for _ in range(20):
+        environment.step(inwards)
+    assert ("right_upper_forearm_visual", "table") in plant.collisions
+    environment.reset()
+    assert not plant.collisions

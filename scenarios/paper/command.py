@@ -14,6 +14,11 @@ if TYPE_CHECKING:
 
 # How well measured grip has to follow the computed curve, RMS over its peak [-].
 _GRIP_ERROR = 0.03
+_MARKS = {
+    True: "[green]reproduced[/]    ",
+    False: "[red]not reproduced[/]",
+    None: "side by side  ",
+}
 
 
 @dataclass(frozen=True)
@@ -54,7 +59,7 @@ def _print(found: Reproduction) -> None:
 
     console = Console(highlight=False)
     for s in found.statements:
-        mark = "[green]reproduced[/]    " if s.reproduced else "[red]not reproduced[/]"
+        mark = _MARKS[s.reproduced]
         console.print(f"{mark}  {s.statement}: [bold]{s.paper}[/]; ours: [bold]{s.ours}[/]")
         console.print(Padding(s.reason, (0, 0, 0, 16)), style="dim")
     for name, errors in found.grip_errors.items():

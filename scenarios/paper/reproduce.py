@@ -23,6 +23,7 @@ from scenarios.paper.figures import Curve, Figure, draw
 from scenarios.paper.statements import Statement, all_statements
 from sim.files import write_json
 from sim.poses import PathProblems
+from sim.report import Verdict
 from sim.run import Request, Result, execute
 from sim.scenario import Scenario
 from sim.settings import controllers
@@ -31,6 +32,8 @@ from synthesis.contact import N
 
 Step = Callable[[str], None]
 STEPS = 7
+# The second objective of a kind often lies on the first: it is drawn dotted over it.
+_STYLES = {"GFOP max": "-", "GFOP norm": ":", "TOP max": "-", "TOP norm": ":"}
 
 
 @dataclass(frozen=True)
@@ -88,7 +91,10 @@ def reproduce(out: Path, step: Step) -> Reproduction:
     errors = {
         name: [grip_error(loop, contact) for contact in range(2)] for name, loop in loops.items()
     }
-    table = [dataclasses.asdict(s) | {"reproduced": bool(s.reproduced)} for s in statements]
+    table = [
+        dataclasses.asdict(s) | {"reproduced": None if s.reproduced is None else bool(s.reproduced)}
+        for s in statements
+    ]
     write_json(out / "paper.json", {"statements": table, "closed_loop_grip_error": errors})
     return Reproduction(tuple(statements), errors)
 
@@ -106,6 +112,8 @@ def closed_loop(chosen: Scenario, objective: Objective) -> Loop:
     """Runs a scenario with its own control, and computes its problem at the same tilts."""
     control = replace(chosen.control, objective=objective)
     result = execute(Request(chosen, "margin", control))
+    if result.report.verdict is Verdict.INTERRUPTED:
+        raise KeyboardInterrupt
     trace, history = result.trace, result.history
     tilting = [i for i, p in enumerate(chosen.phases) if p.name == "tilt"]
     rows = np.flatnonzero(np.isin(trace.phase, tilting))[::20]
@@ -131,7 +139,7 @@ def grip_error(loop: Loop, contact: int) -> float:
 
 def _curves(sweeps: dict[str, Sweep], contacts: dict[str, int]) -> list[Curve]:
     return [
-        Curve(f"{name}, {contact}", s.tilt_deg, s.normal[:, index])
+        Curve(f"{name}, {contact}", s.tilt_deg, s.normal[:, index], _STYLES[name])
         for name, s in sweeps.items()
         for contact, index in contacts.items()
     ]
@@ -205,7 +213,7 @@ def _box_figures(sweeps: dict[str, Sweep], gfop: Loop, top: Loop) -> list[Figure
                     f"figure-{number}{letter}", title, "normal force [N]", caption, tuple(curves)
                 )
             )
-    torque = [Curve(name, s.tilt_deg, s.torque) for name, s in sweeps.items()]
+    torque = [Curve(name, s.tilt_deg, s.torque, _STYLES[name]) for name, s in sweeps.items()]
     for kind, loop in loops.items():
         torque += [
             Curve(f"{kind} with margin", loop.computed.tilt_deg, loop.computed.torque, "--"),

@@ -23,14 +23,14 @@ class Statement:
         statement: What the paper says.
         paper: Its figure.
         ours: Ours.
-        reproduced: Whether they agree.
+        reproduced: Whether they agree; None for what is only set side by side.
         reason: Why, or why not, and what it takes.
     """
 
     statement: str
     paper: str
     ours: str
-    reproduced: bool
+    reproduced: bool | None
     reason: str
 
 
@@ -167,7 +167,10 @@ def _cylinder_statements(sweeps: dict[str, Sweep]) -> list[Statement]:
     tilted = paper_cylinder()
     gfop = sweeps["GFOP max"]
     outer, inner = gfop.normal[:, 0], gfop.normal[:, 1]
-    crossing = float(np.interp(0.0, outer - inner, gfop.tilt_deg))
+    swapped = int(np.argmax(outer > inner))
+    before, after = (outer - inner)[swapped - 1 : swapped + 1]
+    step = gfop.tilt_deg[swapped] - gfop.tilt_deg[swapped - 1]
+    crossing = float(gfop.tilt_deg[swapped] - step * after / (after - before))
     end = _feasible_to(tilted)
     lift = lifted(tilted)
     without_limit = replace(lift, hands=tuple(replace(hand, f_n_max=np.inf) for hand in lift.hands))
@@ -234,7 +237,7 @@ def _speed(box: dict[str, Sweep], cylinder: dict[str, Sweep]) -> list[Statement]
             f"computation time per pose: {what}",
             paper,
             f"{1e3 * float(np.median(sweep.solve_s)):.2f} ms",
-            True,
+            None,
             "median solver time on Clarabel; the paper: MATLAB, CVX and SDPT3 at 1.8 GHz",
         )
         for what, paper, sweep in rows

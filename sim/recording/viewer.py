@@ -28,8 +28,9 @@ _RERUN = (sys.executable, "-m", "rerun")
 _SIZE = "1920x1080"
 _LOADING_S = 60.0
 _POLL_S = 0.2
-# A view that has just got its data needs some frames until textures and legends stand.
-_SETTLING_S = 1.0
+# The viewer fetches what it shows only once it is asked to paint it: a picture counts when it has
+# not changed for this many seconds, and at the deadline at the latest.
+_SETTLED_S, _DEADLINE_S, _PAINT_S = 1.5, 20.0, 0.5
 
 
 class ViewerError(FulcrumError):
@@ -88,8 +89,7 @@ def screenshot(run: Path, at_s: float, picture: Path) -> None:
         if not start <= at_s <= end:
             raise InvalidInputError("--at", f"{at_s:g} s", f"{start:g} to {end:.3f} s")
         client.set_time(TIMELINE, duration=at_s, play_state="paused")
-        time.sleep(_SETTLING_S)
-        picture.write_bytes(client.take_screenshot())
+        picture.write_bytes(_settled_picture(client))
 
 
 @contextlib.contextmanager
@@ -139,6 +139,18 @@ def _connect(process: subprocess.Popen[bytes], url: str) -> ViewerClient | None:
             return client
         time.sleep(_POLL_S)
     return None
+
+
+def _settled_picture(client: ViewerClient) -> bytes:
+    """The viewer's picture once it has stopped changing."""
+    deadline = time.monotonic() + _DEADLINE_S
+    last, since = client.take_screenshot(), time.monotonic()
+    while time.monotonic() < deadline and time.monotonic() - since < _SETTLED_S:
+        time.sleep(_PAINT_S)
+        picture = client.take_screenshot()
+        if picture != last:
+            last, since = picture, time.monotonic()
+    return last
 
 
 def _time_range(client: ViewerClient) -> tuple[float, float]:
