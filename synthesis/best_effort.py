@@ -22,7 +22,7 @@ from synthesis.contact import Array
 from synthesis.errors import InfeasibleError, SolverError
 from synthesis.problem import Objective, Problem
 from synthesis.solution import certificate
-from synthesis.synthesizer import SOLVED, solver_settings
+from synthesis.solver import SOLVED, fallback_settings, solver_settings
 
 _GRIP_WEIGHT = 1e-4
 
@@ -62,15 +62,17 @@ def best_effort(problem: Problem) -> BestEffort:
     rest = np.column_stack([A[balance.stop :], np.zeros(form.rows - balance.stop)])
     q = np.zeros(form.columns + 1)
     q[form.aux_column], q[-1] = _GRIP_WEIGHT, 1.0
-    solver = clarabel.DefaultSolver(
+    program = (
         sp.csc_matrix((len(q), len(q))),
         q,
         sp.csc_matrix(np.vstack([cone, rest])),
         np.concatenate([[0.0], weights * b[balance], b[balance.stop :]]),
         [clarabel.SecondOrderConeT(7), *form.clarabel_cones[1:]],
-        solver_settings(),
     )
-    result = solver.solve()
+    for settings in (solver_settings(), *fallback_settings()):
+        result = clarabel.DefaultSolver(*program, settings).solve()
+        if str(result.status) in (*SOLVED, "PrimalInfeasible"):
+            break
     if str(result.status) == "PrimalInfeasible":
         z = np.array(result.z)
         ray = form.multipliers(problem, np.concatenate([weights * z[1:7], z[7:]]))

@@ -20,12 +20,10 @@ import scipy.sparse as sp
 from synthesis.conic import ConicForm
 from synthesis.errors import SolverError
 from synthesis.problem import Problem
-from synthesis.synthesizer import solver_settings
+from synthesis.solver import SOLVED, fallback_settings, solver_settings
 
 # Linear factors below this are zero to the solver.
 _NO_FACTOR = 1e-8
-# Static regularisations [-] tried in turn: almost none where the default one stalls.
-_REGULARISATIONS = (None, 1e-12, 1e-6)
 
 
 class EmptyRangeError(Exception):
@@ -78,18 +76,14 @@ class _FactorProgram:
         P, q = sp.csc_matrix((columns, columns)), np.zeros(columns)
         q[-1] = sign
         status = ""
-        for regularisation in _REGULARISATIONS:
-            settings = solver_settings()
-            if regularisation is not None:
-                settings.equilibrate_enable = False
-                settings.static_regularization_constant = regularisation
+        for settings in (solver_settings(), *fallback_settings()):
             solver = clarabel.DefaultSolver(P, q, self._A, self._b, self._cones, settings)
             result = solver.solve()
             status = str(result.status)
+            if status in SOLVED:
+                factor = float(result.x[-1])
+                return factor if factor > _NO_FACTOR else 0.0
             match status:
-                case "Solved" | "AlmostSolved":
-                    factor = float(result.x[-1])
-                    return factor if factor > _NO_FACTOR else 0.0
                 case "PrimalInfeasible":
                     raise EmptyRangeError
                 case "DualInfeasible":

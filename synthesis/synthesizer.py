@@ -40,19 +40,11 @@ from synthesis.contact import Array, ContactModel, N
 from synthesis.errors import InfeasibleError, SolverError, UnboundedError
 from synthesis.problem import Objective, Problem
 from synthesis.solution import Multipliers, Solution, certificate
+from synthesis.solver import SOLVED, fallback_settings, solver_settings
 
-# Feasibility and gap, relative to the load: 1e-6 of an objective that is a thousandth of the load,
-# as near the balance point, at the cost of one iteration more than 1e-7 takes. On degenerate
-# problems the linear algebra stalls a little above the first; the second is accepted, too.
-TOLERANCE = 1e-9
-_ACCEPTED_TOLERANCE = 1e-8
 _MARGIN_TOLERANCE = 1e-9
 _MARGIN_SOLVES = 50
-SOLVED = ("Solved", "AlmostSolved")
 _PROVEN = ("PrimalInfeasible", "DualInfeasible")
-# Where the prebuilt solver stalls, these static regularisations [-] are tried in turn: almost none
-# resolves problems on the brink of infeasibility, much those with an ill-conditioned optimum.
-_FALLBACK_REGULARISATIONS = (1e-12, 1e-6)
 # The solver's feasibility is relative to its largest number, which may be an absurd bound.
 _WORST_IMBALANCE = 1e-6
 # What an attempt must keep, where there is a second chance.
@@ -64,22 +56,6 @@ _FARTHEST = 1e4
 _REST = 16
 # Normal forces below this fraction of the largest force count as none: their cones are noise.
 _LOADED = 1e-6
-
-
-def solver_settings() -> clarabel.DefaultSettings:
-    """Quiet, single-threaded and tight; with the right to update the data."""
-    settings = clarabel.DefaultSettings()
-    settings.verbose = False
-    settings.max_threads = 1
-    settings.tol_feas = settings.tol_gap_abs = settings.tol_gap_rel = TOLERANCE
-    settings.reduced_tol_feas = _ACCEPTED_TOLERANCE
-    settings.reduced_tol_gap_abs = settings.reduced_tol_gap_rel = _ACCEPTED_TOLERANCE
-    settings.tol_infeas_abs = settings.tol_infeas_rel = TOLERANCE
-    # These three would remove rows or entries, and with them the right to update the data.
-    settings.presolve_enable = False
-    settings.chordal_decomposition_enable = False
-    settings.input_sparse_dropzeros = False
-    return settings
 
 
 class Synthesizer:
@@ -218,10 +194,7 @@ class _Program:
         result = self._update_and_solve(A, b)
         if self._decides(result, A, b):
             return result
-        for regularisation in _FALLBACK_REGULARISATIONS:
-            settings = solver_settings()
-            settings.equilibrate_enable = False
-            settings.static_regularization_constant = regularisation
+        for settings in fallback_settings():
             result = self._build(A.take(self._entries), b, settings).solve()
             if self._decides(result, A, b):
                 return result

@@ -13,7 +13,7 @@ import numpy as np
 import scipy.sparse as sp
 
 from synthesis.conic import ConicForm
-from synthesis.synthesizer import solver_settings
+from synthesis.solver import solver_settings
 
 TOLERANCE = 1e-9
 
