@@ -37,15 +37,15 @@ class ContactLog:
 
     def append(self, step: int, model: mujoco.MjModel, data: mujoco.MjData) -> None:
         """Keeps the contacts of the step that was just made."""
+        contacts = data.contact
         first, last = self.count, self.count + data.ncon
         while last > len(self.step):
             self._grow()
-        contacts = data.contact
         self.step[first:last], self.t[first:last] = step, data.time
         self.geoms[first:last], self.point[first:last] = contacts.geom, contacts.pos
         self.frame[first:last] = contacts.frame
-        for i in range(data.ncon):
-            mujoco.mj_contactForce(model, data, i, self.wrench[first + i])
+        for i, wrench in enumerate(self.wrench[first:last]):
+            mujoco.mj_contactForce(model, data, i, wrench)
         self.count = last
 
     def _grow(self) -> None:

@@ -74,7 +74,7 @@ class ContactFrames:
 
     def points(self, R_WO: Array, p_WO: Array) -> Array:
         """Contact points in the world [m], (m, 3), for a pose of the object."""
-        return p_WO + self.p_OC_O @ R_WO.T
+        return p_WO + self.p_OC_O.dot(R_WO.T)
 
 
 def rotations(quaternions: Array) -> Array:

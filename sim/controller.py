@@ -10,6 +10,7 @@ the same bandwidth :math:`\omega`: damping that is explicit in time stays stable
 
 from __future__ import annotations
 
+import math
 import time
 from dataclasses import dataclass
 
@@ -34,7 +35,7 @@ from synthesis.best_effort import BestEffort, best_effort
 from synthesis.contact import Array
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(eq=False, slots=True)  # one every step, and a frozen one takes thrice as long
 class Command:
     """What the controller asks of the motors, and why.
 
@@ -77,9 +78,11 @@ class Controller:
         self._synthesizer = Synthesizer()
         self._tick = 0
         self._w_OC_C = np.zeros((len(scenario.contact_names), 6))
-        self._mass_matrix = np.zeros((len(robot.joints), len(robot.joints)))
-        self._tau_g = np.zeros(len(robot.joints))
-        self._tau_f = np.zeros(len(robot.joints))
+        joints = len(robot.joints)
+        self._tau_g, self._tau_f = np.zeros(joints), np.zeros(joints)
+        self._share, self._tau_held, self._w_held = math.nan, self._tau_g, self._w_OC_C
+        # Deviations of angles and speeds, and torques per each of them: both terms in one product.
+        self._deviation, self._gains = np.zeros((2, joints)), np.zeros((joints, 2, joints))
 
     def command(self, measurement: Measurement) -> Command:
         """The torques for the next step."""
@@ -87,16 +90,18 @@ class Controller:
         synthesis_s, failed = 0.0, False
         if self._tick % self._control.solve_every == 0:
             self._update_model(measurement)
+            self._share = math.nan  # what was held is to be found anew
             if not self._free[phase]:
                 started = time.perf_counter()
                 failed = not self._synthesize(measurement)
                 synthesis_s = time.perf_counter() - started
         self._tick += 1
         share = grip if self._control.feedforward else 0.0
-        tau = self._tau_g + share * self._tau_f + self._robot.damping * qd_ref
-        omega = self._control.bandwidth
-        acceleration = omega**2 * (q_ref - measurement.q) + 2.0 * omega * (qd_ref - measurement.qd)
-        tau += self._mass_matrix @ acceleration
+        np.subtract(q_ref, measurement.q, self._deviation[0])
+        np.subtract(qd_ref, measurement.qd, self._deviation[1])
+        tau = self._gains.reshape(len(q_ref), -1).dot(self._deviation.reshape(-1))
+        tau += self._robot.damping * qd_ref
+        tau += self._held(share)
         limited = np.minimum(np.maximum(tau, self._robot.tau_min), self._robot.tau_max)
         return Command(
             tau=limited,
@@ -104,14 +109,23 @@ class Controller:
             q_ref=q_ref,
             phase=phase,
             tilt_ref=tilt,
-            w_OC_C=share * self._w_OC_C,
+            w_OC_C=self._w_held,
             synthesis_s=synthesis_s,
             failed=failed,
         )
 
+    def _held(self, share: float) -> Array:
+        """Torques that hold robot and object, as until the next synthesis or change of share."""
+        if share != self._share:
+            self._share = share
+            self._tau_held = self._tau_g + share * self._tau_f
+            self._w_held = share * self._w_OC_C
+        return self._tau_held
+
     def _update_model(self, measurement: Measurement) -> None:
         self._robot.update(measurement.q)
-        self._mass_matrix = self._robot.mass_matrix()
+        omega, mass_matrix = self._control.bandwidth, self._robot.mass_matrix()
+        self._gains[:, 0], self._gains[:, 1] = omega**2 * mass_matrix, 2.0 * omega * mass_matrix
         self._tau_g = self._robot.gravity()
 
     def _synthesize(self, measurement: Measurement) -> bool:

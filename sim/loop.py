@@ -18,8 +18,8 @@ from sim.settings import Control
 from sim.trace import Trace
 from synthesis import FulcrumError
 
-# Steps per block that is handed on while the loop runs [s]; what an abrupt end may lose.
-_BLOCK_S = 0.25
+# Time per block that is handed on while the loop runs [s]; what an abrupt end may lose.
+_BLOCK_S = 0.4
 
 
 class DivergedError(FulcrumError):

@@ -5,7 +5,9 @@ from __future__ import annotations
 import warnings
 from dataclasses import dataclass
 
+import mujoco
 import numpy as np
+from dm_control.rl.control import PhysicsError
 
 from sim.contact_log import ContactLog, ContactReader
 from sim.contacts import rotations
@@ -21,7 +23,7 @@ with warnings.catch_warnings():  # dm_control looks for a display on import; non
     from dm_control.mujoco import wrapper
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(eq=False, slots=True)  # one every step, and a frozen one takes thrice as long
 class Measurement:
     """What the controller gets to know at one instant.
 
@@ -59,6 +61,7 @@ class Plant:
         model = self._model
         joints = [int(model.actuator(i).trnid[0]) for i in range(model.nu)]
         self.joints = tuple(model.joint(j).name for j in joints)
+        self._warnings = self._data.warning.number  # of each kind, since the last reset
         self._q = model.jnt_qposadr[joints].copy()
         self._qd = model.jnt_dofadr[joints].copy()
         thing = model.body(scenario.object.name)
@@ -93,7 +96,13 @@ class Plant:
         Raises:
             dm_control.rl.control.PhysicsError: The state has diverged.
         """
-        self.physics.step()
+        # As dm_control's own step, whose check takes an eighth of the time of the step itself.
+        before = self._warnings.tobytes()
+        mujoco.mj_step(self._model, self._data)
+        if self._warnings.tobytes() != before:
+            kinds = [kind.name for kind in mujoco.mjtWarning.__members__.values()]
+            new = np.flatnonzero(self._warnings > np.frombuffer(before, self._warnings.dtype))
+            raise PhysicsError(f"MuJoCo warns of {', '.join(kinds[i] for i in new)}.")
 
     def measure(self) -> Measurement:
         """The present state."""

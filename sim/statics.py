@@ -39,7 +39,7 @@ class Statics:
             contacts=self._contacts,
             R_OC=R_OC,
             p_OC_O=self._frames.p_OC_O,
-            w_ext_O=self._at_center @ (R_WO.T @ self._weight_W),
+            w_ext_O=self._at_center.dot(R_WO.T.dot(self._weight_W)),
             joints=None if self._robot is None else self._robot.statics(p_WC[:n], R_WO @ R_OC[:n]),
             objective=self._objective,
         )
