@@ -19,7 +19,7 @@ from sim.trace import Trace
 from synthesis import FulcrumError
 
 # Time per block that is handed on while the loop runs [s]; what an abrupt end may lose.
-_BLOCK_S = 0.4
+_BLOCK_S = 0.25
 
 
 class DivergedError(FulcrumError):
