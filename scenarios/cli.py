@@ -8,7 +8,6 @@ import re
 import sys
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from datetime import datetime
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -21,8 +20,8 @@ from scenarios.common import (
     INTERRUPTED,
     PASSED,
     chosen_control,
-    new_folder,
     progress_bar,
+    results_folder,
 )
 from scenarios.paper.command import Reproduce
 
@@ -120,14 +119,8 @@ class Run:
             raise InvalidInputError("--seed", self.seed, "an integer >= 0")
         if self.anyway:
             control = replace(control, best_effort=True)
-        return Request(
-            chosen, self.controller, control, self.seed, self._out(), self.live, self.anyway
-        )
-
-    def _out(self) -> Path:
-        stamp = datetime.now().strftime("%Y%m%d-%H%M%S")
-        out = self.out or Path("logs") / f"{self.scenario}-{self.controller}-{stamp}"
-        return new_folder(out)
+        out = results_folder(self.out, f"{self.scenario}-{self.controller}")
+        return Request(chosen, self.controller, control, self.seed, out, self.live, self.anyway)
 
 
 @dataclass(frozen=True)

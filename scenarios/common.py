@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 from collections.abc import Callable, Iterator
 from dataclasses import replace
+from datetime import datetime
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -59,13 +60,14 @@ def check_json(path: Path | None) -> None:
         raise InvalidInputError("--json", str(path), "a file in a folder that exists")
 
 
-def new_folder(out: Path) -> Path:
-    """The folder, if results may be written there.
+def results_folder(out: Path | None, name: str) -> Path:
+    """The folder asked for, if results may be written there; logs/NAME-TIME if none is.
 
     Raises:
         InvalidInputError: It is not empty, or cannot be a folder.
     """
     from sim.files import check_new_folder
 
-    check_new_folder("--out", out)
-    return out
+    folder = out or Path("logs") / f"{name}-{datetime.now():%Y%m%d-%H%M%S}"
+    check_new_folder("--out", folder)
+    return folder

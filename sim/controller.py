@@ -47,7 +47,8 @@ class Command:
         tilt_ref: Reference tilt [rad].
         w_OC_C: Commanded wrenches on the object in contact axes [N, N·m], (m, 6).
         synthesis_s: Wall time of this tick's synthesis [s]; 0 where none was due.
-        failed: Whether this tick's synthesis had no solution, so that the last one was kept.
+        failed: Whether this tick's synthesis had no solution, so that the last forces, or with best
+            effort those nearest to balance, are applied.
     """
 
     tau: Array

@@ -9,7 +9,7 @@ from dm_control.rl.control import PhysicsError
 
 from sim.contacts import ContactFrames
 from sim.controller import Controller
-from sim.ik import plan_joints
+from sim.ik import JointPath, plan_joints
 from sim.path import ScrewPath
 from sim.plant import Measurement, Plant
 from sim.robot import RobotModel
@@ -45,21 +45,23 @@ class ClosedLoop:
         control: Control,
         truth: Scenario | None = None,
         seed: int = 0,
+        joint_path: JointPath | None = None,
     ) -> None:
-        """Plans the joint path and sets up plant and controller.
+        """Plans the joint path, if need be, and sets up plant and controller.
 
         Args:
             scenario: What the controller believes.
             control: The controller.
             truth: What the plant is; the scenario if left out.
             seed: Draws the deviations of the start posture.
+            joint_path: The scenario's, where it is planned already.
 
         Raises:
             PathError: The arms cannot follow the path.
         """
         self._path = ScrewPath(scenario.path)
         self.robot = robot = RobotModel(scenario)
-        joint_path = plan_joints(scenario)
+        joint_path = joint_path or plan_joints(scenario)
         self._controller = Controller(scenario, control, robot, joint_path)
         self._plant = Plant(truth or scenario)
         deviation = np.random.default_rng(seed).normal(size=len(robot.joints))

@@ -22,6 +22,7 @@ class PathProblems:
     Attributes:
         scenario: The scene.
         end_deg: Tilt at the end of the path [deg].
+        joint_path: How the arms follow it; None without joints.
     """
 
     def __init__(self, scenario: Scenario, control: Control, with_joints: bool = True) -> None:
@@ -39,7 +40,7 @@ class PathProblems:
         self._path = ScrewPath(scenario.path)
         self.end_deg = float(np.degrees(self._path.end))
         self._robot = RobotModel(scenario) if with_joints else None
-        self._joint_path = plan_joints(scenario) if with_joints else None
+        self.joint_path = plan_joints(scenario) if with_joints else None
         self._statics = Statics(scenario, control, self._robot)
 
     def tilts(self, step_deg: float) -> Array:
@@ -53,8 +54,8 @@ class PathProblems:
             InvalidInputError: The tilt is not on the path.
         """
         tilt = self._tilt(tilt_deg)
-        if self._robot is not None and self._joint_path is not None:
-            self._robot.update(self._joint_path.holding(tilt))
+        if self._robot is not None and self.joint_path is not None:
+            self._robot.update(self.joint_path.holding(tilt))
         R_WO, p_WO = self._path.pose(tilt)
         return self._statics.problem(p_WO, Rotation.from_matrix(R_WO).as_quat(scalar_first=True))
 

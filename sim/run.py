@@ -14,6 +14,7 @@ from typing import Any
 
 from sim.explain import Explanation, explain
 from sim.files import check_new_folder, finite, write_json
+from sim.ik import JointPath
 from sim.judge import Judge
 from sim.loop import ClosedLoop, DivergedError
 from sim.monitor import ContactHistory, Monitor
@@ -100,9 +101,10 @@ def execute(request: Request, progress: Progress | None = None) -> Result:
     scenario, out = request.scenario, request.out
     if out is not None:
         check_new_folder("out", out)
+    joint_path = None
     if request.control.feedforward and not request.anyway:
-        _check_feasible(scenario, request.control)
-    loop = ClosedLoop(scenario, request.control, seed=request.seed)
+        joint_path = _feasible_path(scenario, request.control)
+    loop = ClosedLoop(scenario, request.control, seed=request.seed, joint_path=joint_path)
     monitor = Monitor(scenario)
     robot = loop.robot
     judge = Judge(scenario, robot.joints, robot.tau_min, robot.tau_max)
@@ -152,8 +154,8 @@ def execute(request: Request, progress: Progress | None = None) -> Result:
     return Result(report, trace, history)
 
 
-def _check_feasible(scenario: Scenario, control: Control) -> None:
-    """Refuses a path with a tilt at which a certificate proves that no forces exist."""
+def _feasible_path(scenario: Scenario, control: Control) -> JointPath | None:
+    """The joint path; refused if a certificate proves that no forces exist at one of its tilts."""
     problems, synthesizer = PathProblems(scenario, control), Synthesizer()
     for tilt in problems.tilts(_CHECK_DEG):
         try:
@@ -162,6 +164,7 @@ def _check_feasible(scenario: Scenario, control: Control) -> None:
             raise UnholdableError(explain(problems, float(tilt), synthesizer)) from None
         except (SolverError, UnboundedError):
             continue  # no proof: the controller copes with those as they come
+    return problems.joint_path
 
 
 class _StopSignal:

@@ -12,20 +12,23 @@ from sim.robot import RobotModel
 from sim.run import Request, execute
 from sim.settings import Phase
 
-# The first 10 deg of the box tilt: a run of 2.7 s that passes, with grip built up at 0.6 s.
-PHASES = (
-    Phase("touch", 0.2, tilt=0.0, gap=0.0, grip=0.0),
-    Phase("grip", 0.4, tilt=0.0, gap=0.0, grip=1.0),
-    Phase("tilt", 2.0, tilt=1.0, gap=0.0, grip=1.0),
-    Phase("hold", 0.1, tilt=1.0, gap=0.0, grip=1.0),
-)
-SCENARIO = scenario("box-tilt")
-SCENARIO = replace(
-    SCENARIO,
-    standoff=0.002,
-    phases=PHASES,
-    path=replace(SCENARIO.path, angle_deg=10.0),
-)
+
+def short_tilt(angle_deg, tilt_s):
+    """The first degrees of the box tilt, from hands that nearly touch; grip stands at 0.6 s."""
+    phases = (
+        Phase("touch", 0.2, tilt=0.0, gap=0.0, grip=0.0),
+        Phase("grip", 0.4, tilt=0.0, gap=0.0, grip=1.0),
+        Phase("tilt", tilt_s, tilt=1.0, gap=0.0, grip=1.0),
+        Phase("hold", 0.1, tilt=1.0, gap=0.0, grip=1.0),
+    )
+    box = scenario("box-tilt")
+    path = replace(box.path, angle_deg=angle_deg)
+    return replace(box, standoff=0.002, phases=phases, path=path)
+
+
+# A run of 2.7 s that passes.
+SCENARIO = short_tilt(10.0, 2.0)
+PHASES = SCENARIO.phases
 LIMITS = SCENARIO.tolerances
 LEFT, RIGHT, EDGE_LEFT, _ = range(4)
 TOUCH_ROW, GRIP_ROW, ROW, LAST = 100, 400, 1700, 2699

@@ -16,23 +16,12 @@ from sim.loop import ClosedLoop, DivergedError
 from sim.plant import Plant
 from sim.report import Verdict
 from sim.run import Request, execute, markdown, resolved_config
-from sim.settings import Phase, stretched
+from sim.settings import stretched
+from tests.short_run import short_tilt
 
-# The first 5 deg of the box tilt, which passes: 1.9 s of simulated time.
 BLOCK = 250  # steps that the loop hands over at a time
-PHASES = (
-    Phase("touch", 0.2, tilt=0.0, gap=0.0, grip=0.0),
-    Phase("grip", 0.4, tilt=0.0, gap=0.0, grip=1.0),
-    Phase("tilt", 1.2, tilt=1.0, gap=0.0, grip=1.0),
-    Phase("hold", 0.1, tilt=1.0, gap=0.0, grip=1.0),
-)
-SCENARIO = scenario("box-tilt")
-SCENARIO = replace(
-    SCENARIO,
-    standoff=0.002,
-    phases=PHASES,
-    path=replace(SCENARIO.path, angle_deg=5.0),
-)
+# It passes: 1.9 s of simulated time.
+SCENARIO = short_tilt(5.0, 1.2)
 # 90 deg in 50 ms ask for 34 rad/s of hands on arms of 1.5 rad/s.
 TOO_FAST = replace(SCENARIO, phases=stretched(scenario("box-tilt").phases, 0.05))
 
@@ -82,7 +71,7 @@ def test_a_run_leaves_recording_configuration_and_report(result, folder):
 def test_the_configuration_is_the_resolved_scenario(result, folder):
     config = strict_json(folder / "config.json")
     assert config["scenario"] == plain(asdict(SCENARIO))
-    assert config["scenario"]["phases"] == [asdict(phase) for phase in PHASES]
+    assert config["scenario"]["phases"] == [asdict(phase) for phase in SCENARIO.phases]
     assert config["scenario"]["standoff"] == 0.002
     assert config["scenario"]["path"]["angle_deg"] == 5.0
     assert config["control"] == plain(asdict(SCENARIO.control))

@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from datetime import datetime
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from scenarios.common import FAILED, PASSED, new_folder
+from scenarios.common import FAILED, PASSED, results_folder
 
 if TYPE_CHECKING:
     from scenarios.paper.reproduce import Reproduction
@@ -34,8 +33,7 @@ class Reproduce:
 
         from scenarios.paper.reproduce import STEPS, reproduce
 
-        stamp = datetime.now().strftime("%Y%m%d-%H%M%S")
-        out = new_folder(self.out or Path("logs") / f"reproduce-{stamp}")
+        out = results_folder(self.out, "reproduce")
         out.mkdir(parents=True, exist_ok=True)
         console = Console(stderr=True)
         done = 0

@@ -24,7 +24,7 @@ from scenarios.paper.statements import Statement, all_statements
 from sim.files import write_json
 from sim.poses import PathProblems
 from sim.report import Verdict
-from sim.run import Request, Result, execute
+from sim.run import Request, execute
 from sim.scenario import Scenario
 from sim.settings import controllers
 from synthesis import Objective
@@ -91,10 +91,7 @@ def reproduce(out: Path, step: Step) -> Reproduction:
     errors = {
         name: [grip_error(loop, contact) for contact in range(2)] for name, loop in loops.items()
     }
-    table = [
-        dataclasses.asdict(s) | {"reproduced": None if s.reproduced is None else bool(s.reproduced)}
-        for s in statements
-    ]
+    table = [dataclasses.asdict(statement) for statement in statements]
     write_json(out / "paper.json", {"statements": table, "closed_loop_grip_error": errors})
     return Reproduction(tuple(statements), errors)
 
@@ -105,7 +102,6 @@ class Loop:
 
     measured: Sweep
     computed: Sweep
-    result: Result
 
 
 def closed_loop(chosen: Scenario, objective: Objective) -> Loop:
@@ -125,7 +121,7 @@ def closed_loop(chosen: Scenario, objective: Objective) -> Loop:
     )
     end = chosen.path.angle_deg
     computed = sweep(PathProblems(chosen, control), np.linspace(0.0, end, round(end) + 1))
-    return Loop(measured, computed, result)
+    return Loop(measured, computed)
 
 
 def grip_error(loop: Loop, contact: int) -> float:

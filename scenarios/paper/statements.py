@@ -85,7 +85,7 @@ def _box_statements(sweeps: dict[str, Sweep]) -> list[Statement]:
             "grip becomes negligible as the tilt approaches 70 deg",
             "70 deg",
             f"{least:.0f} deg",
-            abs(least - 70.0) <= 2.0,
+            bool(abs(least - 70.0) <= 2.0),
             "the centre of mass stands over the edge at atan(0.3/0.1) = 71.57 deg; beyond it the "
             f"grip rises again, to {gfop.normal[-1, 0]:.2f} N at 90 deg",
         ),
@@ -100,7 +100,7 @@ def _box_statements(sweeps: dict[str, Sweep]) -> list[Statement]:
             "grip of left and right differs slightly with TOP",
             "figures 6b, 7b",
             f"{difference:.2g} N",
-            difference > 1e-3,
+            bool(difference > 1e-3),
             "the two arms are not mirror images: neither in the paper nor, in their links, in ours",
         ),
         Statement(
