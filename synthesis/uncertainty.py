@@ -25,7 +25,7 @@ from dataclasses import dataclass, fields, replace
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial import ConvexHull
+from scipy.spatial import ConvexHull, QhullError
 
 from synthesis.contact import Array, Contact, ContactModel, N, skew
 from synthesis.errors import InvalidInputError
@@ -147,6 +147,8 @@ class Uncertainty:
     def _offsets(self, problem: Problem) -> Array:
         """Extreme offsets of the n hand contacts, in their axes [m], (k, n, 3)."""
         hands = len(problem.hands)
+        if not self.placement:
+            return np.zeros((1, hands, 3))
         signs = np.array(list(itertools.product((-1.0, 1.0), repeat=2 * hands)))
         d_C = np.zeros((len(signs), hands, 3))
         d_C[:, :, :2] = self.placement * signs.reshape(-1, hands, 2)
@@ -199,4 +201,7 @@ def _extreme_rows(points: Array) -> Indices:
     if rank == 1:
         ends = [coordinates[:, 0].argmin(), coordinates[:, 0].argmax()]
         return first[ends]
-    return first[np.sort(ConvexHull(coordinates).vertices)]
+    try:
+        return first[np.sort(ConvexHull(coordinates).vertices)]
+    except QhullError:  # All but flat, its facets are rounding; with all points nothing is lost.
+        return first

@@ -7,8 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from synthesis import InvalidInputError, Objective, Synthesizer
-from synthesis.errors import RobustInfeasibleError
+from synthesis import InvalidInputError, Objective, RobustInfeasibleError, Synthesizer
 from synthesis.reference import ReferenceInfeasibleError, solve_robust_reference
 from synthesis.robust import robust_grip
 from synthesis.robust_certificate import RobustCertificate
@@ -69,7 +68,7 @@ def test_grip_agrees_with_the_reference(objective, tilt, joints):
     assert robust_grip(problems).value == pytest.approx(expected, rel=AGREEMENT)
 
 
-@settings(derandomize=True, deadline=None, max_examples=15)
+@settings(derandomize=True, deadline=None, max_examples=10)
 @given(seed=st.integers(0, 10**9), objective=st.sampled_from(GRIP_OBJECTIVES))
 def test_random_worlds_have_the_reference_s_grip_or_none(seed, objective):
     problem = random_feasible(seed, objective)
@@ -111,7 +110,7 @@ def test_grip_serves_random_worlds_within_the_set(tilt):
     problem = box(tilt, joints=STRONG)
     gravity, rng = gravity_of(problem), np.random.default_rng(int(tilt))
     f_n = robust_grip(PUSHED.worlds(problem, gravity)).f_n
-    for _ in range(10):
+    for _ in range(6):
         assert is_served(member(rng, problem, gravity, PUSHED), f_n)
 
 
@@ -148,7 +147,8 @@ def test_a_larger_set_takes_no_less_grip(tilt, factors):
         lambda g: replace(g, f_n=1.001 * g.f_n),
         lambda g: replace(g, tau=g.tau + 100.0),
         lambda g: replace(g, tau=g.tau - 100.0),
-        lambda g: replace(g, w_OC_C=g.w_OC_C + 1e-3 * np.eye(6)[3]),
+        # Moments that point contacts do not transmit, and that balance each other.
+        lambda g: replace(g, w_OC_C=g.w_OC_C + np.outer([0, 0, 1e-3, -1e-3], np.eye(6)[3])),
         lambda g: replace(
             g, problems=tuple(replace(p, w_ext_O=p.w_ext_O * 1.001) for p in g.problems)
         ),
@@ -195,6 +195,41 @@ def test_certificate_of_other_worlds_proves_nothing():
     multipliers = error.value.certificate.multipliers
     assert not RobustCertificate((heavy, heavy), multipliers).proves(1e2)
     assert not RobustCertificate((light, light), multipliers).proves(1e2)
+
+
+@pytest.mark.parametrize("world", [0, 1])
+@pytest.mark.parametrize(
+    ("field", "change"),
+    [
+        ("equilibrium", 1e-3),
+        # Of the cones the tangential components alone: they are each world's own.
+        ("cone", 1e-3 * np.eye(6)[0]),
+        ("tau_max", 1e-3),
+        ("f_n_min", -1e-3),
+    ],
+)
+def test_certificate_that_was_tampered_with_proves_nothing(world, field, change):
+    with pytest.raises(RobustInfeasibleError) as error:
+        robust_grip(contradiction())
+    proof = error.value.certificate
+    assert proof.proves(1e4)
+    multipliers = list(proof.multipliers)
+    tampered = {field: getattr(multipliers[world], field) + change}
+    multipliers[world] = replace(multipliers[world], **tampered)
+    assert not replace(proof, multipliers=tuple(multipliers)).proves(1e4)
+
+
+def test_limits_far_too_wide_change_nothing():
+    # Some limits far beyond the forces must not drown them in the solver's norms.
+    problem = box(30.0, joints=STRONG)
+    wide = replace(STRONG, tau_min=-1e9 * STRONG.tau_max, tau_max=1e9 * STRONG.tau_max)
+    contacts = tuple(replace(c, f_n_max=1e10) for c in problem.contacts)
+    loose = replace(problem, contacts=contacts, joints=wide)
+    free = robust_grip(LAB.worlds(box(30.0), gravity_of(problem)))
+    grip = robust_grip(LAB.worlds(loose, gravity_of(loose)))
+    assert grip.value == pytest.approx(free.value, rel=AGREEMENT)
+    # A solver that stalls on them leaves 1e-8 or more, one that does not 1e-15.
+    assert grip.residuals.max() < 1e-11
 
 
 @pytest.mark.parametrize("seed", range(30))

@@ -5,13 +5,12 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from scipy.optimize import linprog
 from scipy.spatial.transform import Rotation
 
-from synthesis import InvalidInputError
-from synthesis.errors import RobustInfeasibleError
+from synthesis import InvalidInputError, RobustInfeasibleError
 from synthesis.robust import robust_grip
 from synthesis.scaling import largest_scaling
 from synthesis.uncertainty import Uncertainty
@@ -181,6 +180,27 @@ def test_set_does_not_depend_on_the_frame_of_a_turned_object(seed):
     assert grips[0] == pytest.approx(grips[1], rel=1e-6)
 
 
+@settings(derandomize=True, deadline=None, max_examples=40)
+@given(seed=st.integers(0, 10**6))
+# On these three Qhull gives up.
+@example(seed=99)
+@example(seed=314)
+@example(seed=391)
+def test_hull_of_an_all_but_flat_set_holds_it(seed):
+    # Sizes over many decades: where the hull's facets are rounding, it must still be found.
+    rng = np.random.default_rng(seed)
+    problem = box(10.0 ** rng.uniform(-16.0, 1.9))
+    gravity = gravity_of(problem)
+    uncertainty = Uncertainty(
+        mass=10.0 ** rng.uniform(-16.0, -0.1),
+        center=tuple((10.0 ** rng.uniform(-16.0, -1.0, 3)).tolist()),
+        push=tuple((10.0 ** rng.uniform(-16.0, 1.0, 3)).tolist()),
+        lever=tuple((10.0 ** rng.uniform(-16.0, 0.0, 3)).tolist()),
+    )
+    wrenches = hull_of(uncertainty, problem, gravity)
+    assert distance(member(rng, problem, gravity, uncertainty).w_ext_O, wrenches) < 1e-6
+
+
 # --- refusals ---
 
 
@@ -228,6 +248,8 @@ def test_largest_scaling_separates_feasible_from_infeasible(problem, uncertainty
     # The bisection's last interval is a thousandth of the largest factor that is tried.
     assert found.infeasible_from - found.factor <= 1e-3 * 4.0
     assert found.certificate.proves(100.0 * problem.load)
+    just_above = uncertainty.scaled(found.infeasible_from).worlds(problem, gravity)
+    assert found.certificate.problems[0].contacts == just_above[0].contacts
     assert found.grip.residuals.max() < 1e-6
     for share in (0.25, 0.5, 0.99):
         robust_grip(uncertainty.scaled(share * found.factor).worlds(problem, gravity))
