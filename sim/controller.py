@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 from sim.channel import Channel, Setpoint
 from sim.drives import Drives
+from sim.grip import GripSchedule
 from sim.ik import JointPath
 from sim.plant import Measurement
 from sim.references import References
@@ -63,6 +64,7 @@ class Controller:
         robot: RobotModel,
         joint_path: JointPath,
         channel: Channel | None = None,
+        grip: GripSchedule | None = None,
     ) -> None:
         """Takes over what it believes.
 
@@ -72,11 +74,12 @@ class Controller:
             robot: Its model.
             joint_path: What the drives follow.
             channel: The wire to the drives; an ideal one if left out.
+            grip: The least normal forces of the hands; the control's preload if left out.
         """
         self._control = control
         self._references = References(joint_path, scenario.physics.timestep)
         self._free = joint_path.schedule.free
-        self._statics = Statics(scenario, control, robot)
+        self._statics = Statics(scenario, control, robot, grip)
         self._synthesizer = Synthesizer()
         self._drives = Drives(robot, control.bandwidth, len(scenario.contact_names))
         self._channel = channel or Channel(NO_DEVIATION)

@@ -10,10 +10,12 @@ from dm_control.rl.control import PhysicsError
 from sim.channel import Channel
 from sim.contacts import ContactFrames
 from sim.controller import Controller
+from sim.grip import GripSchedule
 from sim.ik import JointPath, plan_joints
 from sim.path import ScrewPath
 from sim.plant import Measurement, Plant
 from sim.robot import RobotModel
+from sim.robust import plan_grip
 from sim.scenario import Scenario
 from sim.sensors import Sensors
 from sim.settings import Control
@@ -51,6 +53,7 @@ class ClosedLoop:
         seed: int = 0,
         joint_path: JointPath | None = None,
         world: World = NO_DEVIATION,
+        grip: GripSchedule | None = None,
     ) -> None:
         """Plans the joint path, if need be, and sets up plant and controller.
 
@@ -61,16 +64,20 @@ class ClosedLoop:
             seed: Draws the deviations of the start posture.
             joint_path: The scenario's, where it is planned already.
             world: How the plant deviates from that, and what disturbs it; nothing by default.
+            grip: That of a control with an uncertainty set, where it is planned already.
 
         Raises:
             InvalidInputError: The world does not fit the scenario.
             PathError: The arms cannot follow the path.
+            RobustInfeasibleError: No grip holds even the nominal object somewhere on the path.
         """
         self._path = ScrewPath(scenario.path)
         self.robot = robot = RobotModel(scenario)
         joint_path = joint_path or plan_joints(scenario)
         self.truth = world.truth(truth or scenario)
-        self._controller = Controller(scenario, control, robot, joint_path, Channel(world))
+        if grip is None and control.uncertainty is not None:
+            grip = plan_grip(scenario, control, joint_path)
+        self._controller = Controller(scenario, control, robot, joint_path, Channel(world), grip)
         self._sensors = Sensors(world)
         self._plant = Plant(self.truth, world)
         deviation = np.random.default_rng(seed).normal(size=len(robot.joints))

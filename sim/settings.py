@@ -7,6 +7,7 @@ from dataclasses import dataclass, fields, replace
 
 from sim.checks import not_negative, positive, whole
 from synthesis import InvalidInputError, Objective
+from synthesis.uncertainty_set import UncertaintySet
 
 # A trace takes about 2 kB per step: a gigabyte in this time [s].
 _LONGEST_S = 600.0
@@ -103,13 +104,24 @@ class Control:
         whole("control.solve_every", self.solve_every, least=1)
 
 
+# What the robust controller's grip bears.
+_BORNE = UncertaintySet(mass=0.25, center=(0.025,) * 3, friction=0.25, placement=0.005)
+
+
 def controllers(control: Control) -> dict[str, Control]:
     """The controllers by name, made from a scenario's own control.
 
-    ``margin`` is that control; ``paper`` is (17) as printed, with the full friction and no preload;
+    ``robust`` grips for every world of an uncertainty set and is stiffer, ``margin`` is that control; ``paper`` is (17) as printed, with the full friction and no preload;
     ``no-feedforward`` applies joint impedance and gravity compensation alone.
     """
     return {
+        "robust": replace(
+            control,
+            preload=max(control.preload, 25.0),
+            uncertainty=_BORNE,
+            bandwidth=100.0,
+            pose_filter_s=0.05,
+        ),
         "margin": control,
         "paper": replace(control, friction_factor=1.0, preload=0.0),
         "no-feedforward": replace(control, feedforward=False),

@@ -1,6 +1,6 @@
 r"""How much uncertainty one grip can bear: the largest factor on the set with which forces exist.
 
-The sets of a smaller factor lie within those of a larger one (:meth:`Uncertainty.scaled`), and a
+The sets of a smaller factor lie within those of a larger one (:meth:`UncertaintySet.scaled`), and a
 grip that serves a set serves every part of it, so that the feasible factors are an interval from 0
 up, whose end is bisected. Friction multiplies forces; the end is no optimum of one conic program.
 Contact places, whose sets are not exactly convex, may blur it in the second order of their offset.
@@ -16,7 +16,7 @@ from synthesis.problem import Problem
 from synthesis.robust import RobustGrip, robust_grip
 from synthesis.robust_certificate import RobustCertificate
 from synthesis.sensitivity import Gravity
-from synthesis.uncertainty import Uncertainty
+from synthesis.uncertainty_set import UncertaintySet
 
 # The last interval of the bisection, relative to where it starts: below any set's own precision.
 _BISECTED = 1e-3
@@ -43,7 +43,7 @@ class Scaling:
 
 
 def largest_scaling(
-    problem: Problem, gravity: Gravity, uncertainty: Uncertainty, most: float = 4.0
+    problem: Problem, gravity: Gravity, uncertainty: UncertaintySet, most: float = 4.0
 ) -> Scaling:
     """Bisects the factor between 0 and ``most``; what the solver cannot decide is not borne.
 

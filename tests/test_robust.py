@@ -11,7 +11,7 @@ from synthesis import InvalidInputError, Objective, RobustInfeasibleError, Synth
 from synthesis.reference import ReferenceInfeasibleError, solve_robust_reference
 from synthesis.robust import robust_grip
 from synthesis.robust_certificate import RobustCertificate
-from synthesis.uncertainty import Uncertainty
+from synthesis.uncertainty_set import UncertaintySet
 from tests.problems import arms, box, random_feasible, random_infeasible
 from tests.worlds import gravity_of, gripped, is_served, member
 
@@ -19,7 +19,7 @@ GRIP_OBJECTIVES = (Objective.MAX_NORMAL_FORCE, Objective.NORM_NORMAL_FORCE)
 # Both sides solve to 1e-8 at worst, relative to forces that may be a hundred times the value.
 AGREEMENT = 1e-6
 SYNTHESIZER = Synthesizer()
-LAB = Uncertainty(mass=0.1, center=(0.01, 0.01, 0.01), friction=0.15)
+LAB = UncertaintySet(mass=0.1, center=(0.01, 0.01, 0.01), friction=0.15)
 PUSHED = replace(LAB, push=(1.0, 1.0, 1.0), lever=(0.15, 0.1, 0.05))
 # No joint torque goes into holding the arms, so that all of it is left for the grip.
 STRONG = replace(arms(), tau_g=np.zeros(14))

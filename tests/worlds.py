@@ -9,7 +9,7 @@ import numpy as np
 from synthesis import ContactModel, Problem
 from synthesis.reference import ReferenceInfeasibleError, solve_reference
 from synthesis.sensitivity import Gravity
-from synthesis.uncertainty import Uncertainty
+from synthesis.uncertainty_set import UncertaintySet
 
 # Fixed normal forces get this room [N], or the solver's own error would cut the forces off.
 ROOM = 1e-5
@@ -39,7 +39,7 @@ def is_served(problem: Problem, f_n: np.ndarray) -> bool:
 
 
 def member(
-    rng: np.random.Generator, problem: Problem, gravity: Gravity, uncertainty: Uncertainty
+    rng: np.random.Generator, problem: Problem, gravity: Gravity, uncertainty: UncertaintySet
 ) -> Problem:
     """A random world of the set, all places but those of the hands included."""
     weight = gravity.weight * (1.0 + uncertainty.mass * rng.uniform(-1.0, 1.0))

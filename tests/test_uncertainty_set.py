@@ -13,11 +13,11 @@ from scipy.spatial.transform import Rotation
 from synthesis import InvalidInputError, RobustInfeasibleError
 from synthesis.robust import robust_grip
 from synthesis.scaling import largest_scaling
-from synthesis.uncertainty import Uncertainty
+from synthesis.uncertainty_set import UncertaintySet
 from tests.problems import arms, box, cylinder
 from tests.worlds import gravity_of, is_served, member
 
-FULL = Uncertainty(
+FULL = UncertaintySet(
     mass=0.2,
     center=(0.02, 0.01, 0.03),
     friction=0.2,
@@ -77,18 +77,18 @@ def test_each_part_of_the_wrench_reaches_beyond_the_hull_when_scaled(field):
 @pytest.mark.parametrize(
     ("uncertainty", "tilt", "count"),
     [
-        (Uncertainty(), 30.0, 1),
-        (Uncertainty(friction=0.5), 30.0, 1),
-        (Uncertainty(mass=0.1), 30.0, 2),
+        (UncertaintySet(), 30.0, 1),
+        (UncertaintySet(friction=0.5), 30.0, 1),
+        (UncertaintySet(mass=0.1), 30.0, 2),
         # Seen along the weight, tilted about one of its axes, a cuboid has 4 corners.
-        (Uncertainty(center=(0.01, 0.01, 0.01)), 0.0, 4),
-        (Uncertainty(center=(0.01, 0.01, 0.01)), 30.0, 4),
-        (Uncertainty(mass=0.1, center=(0.01, 0.01, 0.01)), 30.0, 8),
-        (Uncertainty(push=(1.0, 1.0, 1.0)), 30.0, 6),
-        (Uncertainty(push=(1.0, 0.0, 1.0)), 30.0, 4),
-        (Uncertainty(push=(1.0, 1.0, 1.0), lever=(0.1, 0.1, 0.1)), 30.0, 24),
+        (UncertaintySet(center=(0.01, 0.01, 0.01)), 0.0, 4),
+        (UncertaintySet(center=(0.01, 0.01, 0.01)), 30.0, 4),
+        (UncertaintySet(mass=0.1, center=(0.01, 0.01, 0.01)), 30.0, 8),
+        (UncertaintySet(push=(1.0, 1.0, 1.0)), 30.0, 6),
+        (UncertaintySet(push=(1.0, 0.0, 1.0)), 30.0, 4),
+        (UncertaintySet(push=(1.0, 1.0, 1.0), lever=(0.1, 0.1, 0.1)), 30.0, 24),
         # Opposed hands feel the difference of their offsets alone.
-        (Uncertainty(placement=0.005), 30.0, 4),
+        (UncertaintySet(placement=0.005), 30.0, 4),
     ],
 )
 def test_worlds_are_few(uncertainty, tilt, count):
@@ -99,7 +99,7 @@ def test_worlds_are_few(uncertainty, tilt, count):
 def test_a_cuboid_of_centres_seen_askew_has_six_corners():
     problem = box(30.0)
     gravity = replace(gravity_of(problem), direction_O=np.array([1.0, -2.0, 2.0]) / 3.0)
-    assert len(Uncertainty(center=(0.01, 0.01, 0.01)).worlds(problem, gravity)) == 6
+    assert len(UncertaintySet(center=(0.01, 0.01, 0.01)).worlds(problem, gravity)) == 6
 
 
 def test_set_of_size_zero_is_the_nominal_world():
@@ -123,7 +123,7 @@ def test_friction_is_that_of_the_lowest_and_frictionless_contacts_stay():
 def test_displaced_hands_do_the_same_work_at_any_point_of_theirs():
     problem = box(30.0, joints=arms())
     rng = np.random.default_rng(5)
-    worlds = Uncertainty(placement=0.02).worlds(problem, gravity_of(problem))
+    worlds = UncertaintySet(placement=0.02).worlds(problem, gravity_of(problem))
     assert len(worlds) == 4
     for world in worlds:
         offset_O = world.p_OC_O[:2] - problem.p_OC_O[:2]
@@ -144,7 +144,7 @@ def test_displaced_hands_do_the_same_work_at_any_point_of_theirs():
 @pytest.mark.parametrize("tilt", [0.0, 60.0])
 def test_grip_for_displaced_hands_serves_random_places(tilt):
     problem = box(tilt)
-    uncertainty = Uncertainty(mass=0.1, friction=0.15, placement=0.004)
+    uncertainty = UncertaintySet(mass=0.1, friction=0.15, placement=0.004)
     gravity, rng = gravity_of(problem), np.random.default_rng(int(tilt))
     f_n = robust_grip(uncertainty.worlds(problem, gravity)).f_n
     served = []
@@ -171,7 +171,7 @@ def test_set_does_not_depend_on_the_frame_of_a_turned_object(seed):
         w_ext_O=(problem.w_ext_O.reshape(2, 3) @ R.T).reshape(6),
     )
     # Without directions of its own the set is the same.
-    uncertainty = Uncertainty(mass=0.2, friction=0.1, placement=0.003)
+    uncertainty = UncertaintySet(mass=0.2, friction=0.1, placement=0.003)
     grips = [
         robust_grip(uncertainty.worlds(p, g)).value
         for p, g in ((problem, gravity), (turned, gravity_of(turned)))
@@ -191,7 +191,7 @@ def test_hull_of_an_all_but_flat_set_holds_it(seed):
     rng = np.random.default_rng(seed)
     problem = box(10.0 ** rng.uniform(-16.0, 1.9))
     gravity = gravity_of(problem)
-    uncertainty = Uncertainty(
+    uncertainty = UncertaintySet(
         mass=10.0 ** rng.uniform(-16.0, -0.1),
         center=tuple((10.0 ** rng.uniform(-16.0, -1.0, 3)).tolist()),
         push=tuple((10.0 ** rng.uniform(-16.0, 1.0, 3)).tolist()),
@@ -220,7 +220,7 @@ def test_hull_of_an_all_but_flat_set_holds_it(seed):
 def test_senseless_sets_are_refused(fields):
     (name,) = fields
     with pytest.raises(InvalidInputError, match=rf"uncertainty\.{name}"):
-        Uncertainty(**fields)
+        UncertaintySet(**fields)
 
 
 @pytest.mark.parametrize("factor", [-0.1, 5.0, math.nan])
@@ -236,8 +236,8 @@ def test_factors_that_leave_nothing_are_refused(factor):
 @pytest.mark.parametrize(
     ("problem", "uncertainty"),
     [
-        (box(30.0), Uncertainty(mass=0.1, friction=0.15, placement=0.01)),
-        (cylinder(60.0), Uncertainty(mass=0.1, center=(0.01, 0.0, 0.01), friction=0.1)),
+        (box(30.0), UncertaintySet(mass=0.1, friction=0.15, placement=0.01)),
+        (cylinder(60.0), UncertaintySet(mass=0.1, center=(0.01, 0.0, 0.01), friction=0.1)),
     ],
     ids=["box", "cylinder"],
 )
@@ -268,7 +268,7 @@ def test_set_that_can_be_borne_many_times_over_gives_the_largest_factor_tried():
 
 def test_largest_factor_keeps_some_friction():
     problem = box(71.5)
-    slippery = Uncertainty(friction=0.5)
+    slippery = UncertaintySet(friction=0.5)
     found = largest_scaling(problem, gravity_of(problem), slippery)
     assert found.factor <= found.infeasible_from
     assert found.factor < slippery.largest_factor == 2.0

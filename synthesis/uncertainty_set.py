@@ -40,7 +40,7 @@ _SAME = 1e-9
 
 
 @dataclass(frozen=True)
-class Uncertainty:
+class UncertaintySet:
     """By how much the worlds may differ from the nominal one.
 
     Attributes:
@@ -79,7 +79,7 @@ class Uncertainty:
         share = max(self.mass, self.friction)
         return 1.0 / share if share > 0.0 else math.inf
 
-    def scaled(self, factor: float) -> Uncertainty:
+    def scaled(self, factor: float) -> UncertaintySet:
         """The set with all offsets, shares and pushes multiplied; where pushes act stays.
 
         Raises:
@@ -87,7 +87,7 @@ class Uncertainty:
         """
         if not 0.0 <= factor < self.largest_factor:
             raise InvalidInputError("factor", factor, f"in [0, {self.largest_factor:g})")
-        return Uncertainty(
+        return UncertaintySet(
             mass=factor * self.mass,
             center=_times(factor, self.center),
             friction=factor * self.friction,
