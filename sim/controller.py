@@ -9,6 +9,8 @@ from sim.channel import Channel, Setpoint
 from sim.drives import Drives
 from sim.grip import GripSchedule
 from sim.ik import JointPath
+from sim.observer import PoseObserver
+from sim.path import ScrewPath
 from sim.plant import Measurement
 from sim.references import References
 from sim.robot import RobotModel
@@ -83,6 +85,7 @@ class Controller:
         self._synthesizer = Synthesizer()
         self._drives = Drives(robot, control.bandwidth, len(scenario.contact_names))
         self._channel = channel or Channel(NO_DEVIATION)
+        self._observer = PoseObserver(ScrewPath(scenario.path), control.pose_filter_s)
         self._tick = 0
 
     def command(self, measurement: Measurement) -> Command:
@@ -93,7 +96,7 @@ class Controller:
             self._drives.update_model(measurement.q)
             if not self._free[target.phase]:
                 started = time.perf_counter()
-                failed = not self._synthesize(measurement)
+                failed = not self._synthesize(measurement, target.tilt)
                 synthesis_s = time.perf_counter() - started
         self._tick += 1
         setpoint = self._channel.receive(measurement.t)
@@ -112,9 +115,11 @@ class Controller:
             failed=failed,
         )
 
-    def _synthesize(self, measurement: Measurement) -> bool:
+    def _synthesize(self, measurement: Measurement, tilt_ref: float) -> bool:
         """Sends the forces of a solution, if there is one; returns whether there was."""
-        problem = self._statics.problem(measurement.p_WO, measurement.quat_WO)
+        m = measurement
+        pose = self._observer.update(m.t, m.p_WO, m.quat_WO, tilt_ref)
+        problem = self._statics.problem(*pose)
         forces = self._solve(problem)
         if forces is None:
             return False

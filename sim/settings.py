@@ -86,6 +86,7 @@ class Control:
             applied, instead of the last that did.
         solve_every: Physics steps per synthesis.
         bandwidth: Natural frequency of the joint impedance, which is critically damped [rad/s].
+        pose_filter_s: Time constant with which the object's measured pose is smoothed [s].
     """
 
     friction_factor: float = 0.8
@@ -95,11 +96,12 @@ class Control:
     best_effort: bool = False
     solve_every: int = 4
     bandwidth: float = 30.0
+    pose_filter_s: float = 0.0
 
     def __post_init__(self) -> None:
         if not 0.0 < self.friction_factor <= 1.0:
             raise InvalidInputError("control.friction_factor", self.friction_factor, "in (0, 1]")
-        for name in ("preload", "bandwidth"):
+        for name in ("preload", "bandwidth", "pose_filter_s"):
             not_negative(f"control.{name}", getattr(self, name))
         whole("control.solve_every", self.solve_every, least=1)
 
