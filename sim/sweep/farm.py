@@ -10,6 +10,7 @@ import uuid
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
+import dask
 import pyarrow as pa
 from distributed import Client, KilledWorker, LocalCluster, as_completed
 from distributed.comm.core import CommClosedError
@@ -22,6 +23,8 @@ from synthesis import FulcrumError, InvalidInputError
 
 # How long a scheduler may take to answer, and its first worker to come [s].
 _PATIENCE_S = 10
+# What workers have to say the driver says, or writes into rows.
+_QUIET = {"distributed.nanny.pre-spawn-environ.DASK_LOGGING__DISTRIBUTED": "critical"}
 
 # Called with episodes finished, episodes in total and failures so far.
 Progress = Callable[[int, int, int], None]
@@ -122,6 +125,7 @@ def _cluster(workers: Workers) -> Iterator[Client]:
     with contextlib.ExitStack() as stack:
         if workers.scheduler is None:
             logging.getLogger("distributed").setLevel(logging.CRITICAL)
+            stack.enter_context(dask.config.set(_QUIET))
             address = stack.enter_context(
                 LocalCluster(
                     n_workers=workers.count or os.cpu_count() or 1,
@@ -129,6 +133,7 @@ def _cluster(workers: Workers) -> Iterator[Client]:
                     processes=True,
                     dashboard_address=None,
                     silence_logs=logging.CRITICAL,
+                    preload="sim.sweep.quiet",
                 )
             )
         else:
