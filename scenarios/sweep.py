@@ -16,9 +16,10 @@ import tyro
 from scenarios.common import INTERRUPTED, PASSED, progress_bar
 
 if TYPE_CHECKING:
-    from sim import sweep as sweeps
     from sim.run import Result
     from sim.scenario import Scenario
+    from sim.sweep.design import Sweep as Design
+    from sim.sweep.summary import Score
     from sim.world import World
 
 # How many causes of failure the table names of each controller.
@@ -63,8 +64,10 @@ class Sweep:
     def execute(self) -> int:
         """Does it; returns the exit code."""
         from sim.files import write_json
-        from sim.sweep import Store, Workers, draw_map, run_sweep, scores
-        from sim.sweep.store import MAP, SUMMARY
+        from sim.sweep.farm import Workers, run_sweep
+        from sim.sweep.picture import draw_map
+        from sim.sweep.store import MAP, SUMMARY, Store
+        from sim.sweep.summary import scores
 
         sweep, workers = self._sweep(), Workers(self.workers, self.scheduler)
         pair = self._map(sweep)
@@ -117,11 +120,11 @@ class Sweep:
         _print(found, store.folder, before / minutes if before else None)
         return PASSED
 
-    def _sweep(self) -> sweeps.Sweep:
+    def _sweep(self) -> Design:
         from scenarios import scenario
         from sim.settings import controllers
-        from sim.sweep import Sweep as Design
-        from sim.sweep import parse_grid
+        from sim.sweep.design import Sweep as Design
+        from sim.sweep.parameters import parse_grid
 
         chosen = scenario(self.scenario)
         if self.controllers is None:
@@ -138,7 +141,7 @@ class Sweep:
             grid=parse_grid("--grid", self.grid),
         )
 
-    def _map(self, sweep: sweeps.Sweep) -> tuple[str, str]:
+    def _map(self, sweep: Design) -> tuple[str, str]:
         from sim.sweep.parameters import parameter_name
         from synthesis.errors import InvalidInputError
 
@@ -172,7 +175,7 @@ def drawn_world(scenario: Scenario, preset: str, seed: int, values: str) -> Worl
         InvalidInputError: There is no such preset, or the values are not of the form that it names.
     """
     from sim import uncertainty
-    from sim.sweep import overridden, parse_values
+    from sim.sweep.parameters import overridden, parse_values
 
     drawn = uncertainty.draw(uncertainty.preset(preset), scenario, seed)
     return overridden(drawn, scenario, parse_values("--world", values))
@@ -181,14 +184,14 @@ def drawn_world(scenario: Scenario, preset: str, seed: int, values: str) -> Worl
 def print_outcome(scenario: Scenario, result: Result) -> None:
     """Prints whether a run would count as success in a sweep, and why not if not."""
     from sim.robot import RobotModel
-    from sim.sweep import Criteria, violations
+    from sim.sweep.criteria import Criteria, violations
 
     found = violations(Criteria(), scenario, RobotModel(scenario).joints, result)
     texts = [f"{violation.text} at {violation.t:.2f} s" for violation in found]
     print(f"in a sweep: {'failure: ' + ', '.join(texts) if texts else 'success'}")
 
 
-def _print(found: tuple[sweeps.Score, ...], folder: Path, per_minute: float | None) -> None:
+def _print(found: tuple[Score, ...], folder: Path, per_minute: float | None) -> None:
     from rich.box import SIMPLE
     from rich.console import Console
     from rich.markup import escape

@@ -9,7 +9,7 @@ from pathlib import Path
 
 from scenarios import scenarios
 from scenarios.cli import main
-from sim.sweep import Sweep
+from sim.sweep.design import Sweep
 from tests.short_run import short_tilt
 
 # Simulates 1.3 s: time enough for grip, and to lose it.

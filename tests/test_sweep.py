@@ -8,6 +8,8 @@ import signal
 import subprocess
 import sys
 import time
+from pathlib import Path
+from typing import NamedTuple
 
 import dask
 import psutil
@@ -16,7 +18,9 @@ import pytest
 
 from scenarios import scenarios
 from scenarios.cli import main
-from sim.sweep import LostEpisodesError, Store, Sweep, Workers, run_sweep
+from sim.sweep.design import Sweep
+from sim.sweep.farm import LostEpisodesError, Workers, run_sweep
+from sim.sweep.store import Store
 from sim.world import World
 from synthesis import InvalidInputError
 from tests.sweeps import ROOT, SCENE, short_sweep
@@ -40,110 +44,6 @@ def flat(content, prefix=""):
             flat(value, f"{prefix}{key}.") if isinstance(value, dict) else {f"{prefix}{key}": value}
         )
     return found
-
-
-def without_times(row):
-    return {name: value for name, value in row.items() if name not in TIMES}
-
-
-@pytest.fixture(scope="module")
-def finished(tmp_path_factory):
-    """A sweep on two workers of which one is killed when the first episode is finished."""
-    folder = tmp_path_factory.mktemp("sweep") / "out"
-    sweep = short_sweep(grid=(("friction", (1.0, 0.5)),))
-    killed, seen = [], []
-
-    def progress(done, total, failures):
-        seen.append((done, total, failures))
-        if done == 1 and not killed:
-            killed.append(workers_of(os.getpid())[0])
-            killed[0].kill()
-
-    rows = run_sweep(sweep, Store(sweep, folder), Workers(2), progress).to_pylist()
-    assert killed
-    assert not killed[0].is_running() or killed[0].status() == psutil.STATUS_ZOMBIE
-    return sweep, folder, rows, seen
-
-
-def test_every_episode_is_there_once_though_a_worker_died(finished):
-    sweep, _, rows, _ = finished
-    # Two seeds, two points of the grid, two controllers.
-    assert len(rows) == len(sweep.all_episodes()) == 8
-    asked = [(e.number, e.controller, e.seed) for e in sweep.all_episodes()]
-    assert [(r["episode"], r["controller"], r["seed"]) for r in rows] == asked
-    assert all(math.isfinite(row["tilt.final_deg"]) for row in rows)
-
-
-def test_progress_counts_episodes_and_failures(finished):
-    _, _, rows, seen = finished
-    assert [done for done, _, _ in seen] == list(range(9))
-    assert {total for _, total, _ in seen} == {8}
-    assert seen[-1][2] == sum(not row["success"] for row in rows) > 0
-
-
-def test_a_finished_sweep_is_one_file_and_not_run_again(finished):
-    sweep, folder, rows, _ = finished
-    assert {path.name for path in folder.iterdir()} == {"config.json", "episodes.parquet"}
-    assert pq.read_table(folder / "episodes.parquet").to_pylist() == rows
-    started = time.perf_counter()
-    again = run_sweep(sweep, Store(sweep, folder), Workers(2)).to_pylist()
-    assert again == rows
-    # No process starts in so short a time; one episode takes as long.
-    assert time.perf_counter() - started < 0.3
-
-
-def test_all_controllers_meet_the_same_worlds(finished):
-    _, _, rows, _ = finished
-    worlds = {}
-    for row in rows:
-        truths = {name: value for name, value in row.items() if name.startswith("world.")}
-        assert worlds.setdefault(row["episode"], truths) == truths
-    assert len(worlds) == 4
-    masses = {truths["world.mass"] for truths in worlds.values()}
-    assert len(masses) == 2  # one per seed, at both points of the grid
-
-
-def test_rows_hold_all_truths_of_the_world_and_all_figures_of_the_report(finished, tmp_path):
-    sweep, _, rows, _ = finished
-    names = {name.split(".")[1] for name in rows[0] if name.startswith("world.")}
-    # What has no deviation at all has no columns.
-    empty = {
-        name for name, value in vars(sweep.world(sweep.all_episodes()[0])).items() if value == ()
-    }
-    assert set(vars(World())) - empty <= names
-    assert [rows[0][f"world.friction.{name}"] for name in SCENE.contact_names] == [1.0] * 4
-    assert all(f"contacts.{name}.slip_mm" in rows[0] for name in SCENE.contact_names)
-
-
-def test_a_grid_s_value_decides_and_rows_say_what_a_failure_began_with(finished):
-    _, _, rows, _ = finished
-    margin = [row for row in rows if row["controller"] == "margin"]
-    slippery = [row for row in margin if row["world.friction"] == 0.5]
-    # Synthesis with 80 % of the friction holds where there is all of it, not where half is missing.
-    assert [row["success"] for row in margin if row["world.friction"] == 1.0] == [True, True]
-    assert [row["success"] for row in slippery] == [False, False]
-    for row in slippery:
-        assert row["category"] in ("slip", "lost", "tilt")
-        assert row["cause"].startswith(row["category"])
-        assert 0.0 < row["failed_at_s"] <= row["timing.sim_s"]
-
-
-def test_the_command_of_a_row_replays_it_bit_for_bit(finished, tmp_path, monkeypatch, capsys):
-    _, _, rows, _ = finished
-    monkeypatch.setitem(scenarios(), SCENE.name, SCENE)
-    row = next(r for r in rows if r["controller"] == "margin" and not r["success"])
-    command = shlex.split(row["replay"])
-    assert command[0] == "fulcrum"
-    main([*command[1:], "--out", str(tmp_path / "replay")])
-    report = flat(json.loads((tmp_path / "replay" / "report.json").read_text()))
-    compared = {n: v for n, v in report.items() if n in row and n not in TIMES and n != "failures"}
-    assert len(compared) > 40
-    assert compared == {name: row[name] for name in compared}
-    assert " ".join(report["failures"]) == row["failures"]
-    assert row["cause"] in capsys.readouterr().out
-    # Another seed is another run.
-    other = next(r for r in rows if r["seed"] != row["seed"])
-    assert compared != {name: other[name] for name in compared}
 
 
 def fulcrum(*arguments):
@@ -174,50 +74,177 @@ def wait_for_parts(driver, folder, count):
         time.sleep(0.005)
 
 
-def test_an_interrupted_and_a_killed_sweep_go_on_where_they_stopped(tmp_path, capsys, monkeypatch):
-    out = tmp_path / "out"
-    words = f"sweep {SCENE.name} --episodes 4 --preset lab --controllers margin,paper --workers 2"
-    driver = fulcrum(*words.split(), "--out", str(out))
-    wait_for_parts(driver, out, 2)
+class Story(NamedTuple):
+    """A sweep that is interrupted, killed, and finished though one of its workers is killed.
+
+    Attributes:
+        sweep: What it is.
+        folder: Where it is.
+        errors: What the interrupted command said.
+        code: How it ended.
+        kept: Names of the finished episodes, and when each was written, after every act.
+        orphans: Processes that the killed driver left.
+        worker: The worker that was killed.
+        seen: Episodes done, in all, and failures, as reported in the last act.
+        parts: Rows as they were found before the last act.
+        rows: All rows.
+    """
+
+    sweep: Sweep
+    folder: Path
+    errors: str
+    code: int
+    kept: list[dict[str, int]]
+    orphans: list[psutil.Process]
+    worker: psutil.Process
+    seen: list[tuple[int, int, int]]
+    parts: dict[str, dict]
+    rows: list[dict]
+
+
+@pytest.fixture(scope="module")
+def story(tmp_path_factory):
+    out = tmp_path_factory.mktemp("sweep") / "out"
+    words = f"sweep {SCENE.name} --episodes 2 --preset lab --seed 5 --workers 1 --out {out}"
+    words += " --controllers margin,paper --grid friction=1.0,0.5"
+    driver = fulcrum(*words.split())
+    wait_for_parts(driver, out, 1)
     os.killpg(driver.pid, signal.SIGINT)  # as Ctrl-C does it: to the workers too
     _, errors = driver.communicate(timeout=60)
-    assert driver.returncode == 130
-    assert len(errors.splitlines()) == 1
-    first = parts_in(out)
-    assert f"{len(first)} episodes are kept, {8 - len(first)} are left" in errors
-    assert 2 <= len(first) < 8
+    kept = [parts_in(out)]
 
     again = shlex.split(errors.partition("Go on with: ")[2])
-    assert again[0] == "fulcrum"
-    driver = fulcrum(*again[1:])
-    wait_for_parts(driver, out, len(first) + 1)
-    orphans = workers_of(driver.pid)
-    driver.kill()
-    driver.communicate(timeout=60)
-    second = parts_in(out)
-    assert len(orphans) == 2
+    assert again[0] == "fulcrum", errors
+    killed = fulcrum(*again[1:])
+    wait_for_parts(killed, out, len(kept[0]) + 1)
+    orphans = workers_of(killed.pid)
+    killed.kill()
+    killed.communicate(timeout=60)
     psutil.wait_procs(orphans, timeout=20)
-    assert not any(orphan.is_running() for orphan in orphans)
-    # What was finished has not been touched, let alone lost.
-    assert len(second) > len(first)
-    assert first.items() <= second.items()
+    kept.append(parts_in(out))
+    parts = {n: pq.ParquetFile(out / "parts" / n).read().to_pylist()[0] for n in kept[1]}
 
-    kept = {
-        name: pq.ParquetFile(out / "parts" / name).read().to_pylist()[0] for name in sorted(second)
-    }
+    workers, seen = [], []
+
+    def progress(done, total, failures):
+        seen.append((done, total, failures))
+        if done == len(kept[1]) + 1 and not workers:
+            workers.append(workers_of(os.getpid())[0])
+            workers[0].kill()
+
+    sweep = short_sweep(grid=(("friction", (1.0, 0.5)),))
+    rows = run_sweep(sweep, Store(sweep, out), Workers(2), progress).to_pylist()
+    return Story(
+        sweep, out, errors, driver.returncode, kept, orphans, workers[0], seen, parts, rows
+    )
+
+
+def test_an_interrupted_sweep_says_in_one_line_how_to_go_on(story):
+    assert story.code == 130
+    assert len(story.errors.splitlines()) == 1
+    kept = len(story.kept[0])
+    assert 1 <= kept < 8
+    assert f"{kept} episodes are kept, {8 - kept} are left" in story.errors
+
+
+def test_what_was_finished_when_the_driver_was_killed_is_kept_as_it_was(story):
+    interrupted, killed = story.kept
+    assert len(interrupted) < len(killed) < 8
+    assert interrupted.items() <= killed.items()
+    final = {f"{row['episode']:07d}-{row['controller']}.parquet": row for row in story.rows}
+    # Times too: none of them was run again.
+    assert {name: final[name] for name in story.parts} == story.parts
+
+
+def test_workers_end_with_a_driver_that_is_killed(story):
+    assert len(story.orphans) == 1
+    assert not story.orphans[0].is_running()
+
+
+def test_every_episode_is_there_once_though_a_worker_died(story):
+    assert not story.worker.is_running()
+    sweep, rows = story.sweep, story.rows
+    # Two seeds, two points of the grid, two controllers.
+    assert len(rows) == len(sweep.all_episodes()) == 8
+    asked = [(e.number, e.controller, e.seed) for e in sweep.all_episodes()]
+    assert [(r["episode"], r["controller"], r["seed"]) for r in rows] == asked
+    assert all(math.isfinite(row["tilt.final_deg"]) for row in rows)
+
+
+def test_progress_counts_episodes_and_failures(story):
+    assert [done for done, _, _ in story.seen] == list(range(len(story.kept[1]), 9))
+    assert {total for _, total, _ in story.seen} == {8}
+    assert story.seen[-1][2] == sum(not row["success"] for row in story.rows) > 0
+
+
+def test_a_finished_sweep_is_one_file_and_not_run_again(story, monkeypatch, capsys):
+    assert pq.read_table(story.folder / "episodes.parquet").to_pylist() == story.rows
     monkeypatch.setitem(scenarios(), SCENE.name, SCENE)
-    assert main(again[1:]) == 0
-    rows = pq.read_table(out / "episodes.parquet").to_pylist()
-    names = [f"{row['episode']:07d}-{row['controller']}.parquet" for row in rows]
-    assert len(names) == len(set(names)) == 8
-    assert {n: r for n, r in zip(names, rows, strict=True) if n in kept} == kept
-    summary = json.loads((out / "sweep.json").read_text())
-    assert summary["session"]["episodes"] == 8 - len(second)
+    arguments = shlex.split(story.errors.partition("Go on with: fulcrum ")[2])
+    assert main(arguments) == 0
+    names = {path.name for path in story.folder.iterdir()}
+    assert names == {"config.json", "episodes.parquet", "sweep.json", "map.png"}
+    assert pq.read_table(story.folder / "episodes.parquet").to_pylist() == story.rows
+    summary = json.loads((story.folder / "sweep.json").read_text())
     assert [summary["controllers"][n]["episodes"] for n in ("margin", "paper")] == [4, 4]
-    assert (out / "map.png").read_bytes().startswith(b"\x89PNG")
+    assert (story.folder / "map.png").read_bytes().startswith(b"\x89PNG")
     output = capsys.readouterr().out
     assert "margin" in output
-    assert str(out) in output
+    assert str(story.folder) in output
+
+
+def test_all_controllers_meet_the_same_worlds(story):
+    rows = story.rows
+    worlds = {}
+    for row in rows:
+        truths = {name: value for name, value in row.items() if name.startswith("world.")}
+        assert worlds.setdefault(row["episode"], truths) == truths
+    assert len(worlds) == 4
+    masses = {truths["world.mass"] for truths in worlds.values()}
+    assert len(masses) == 2  # one per seed, at both points of the grid
+
+
+def test_rows_hold_all_truths_of_the_world_and_all_figures_of_the_report(story):
+    sweep, rows = story.sweep, story.rows
+    names = {name.split(".")[1] for name in rows[0] if name.startswith("world.")}
+    # What has no deviation at all has no columns.
+    empty = {
+        name for name, value in vars(sweep.world(sweep.all_episodes()[0])).items() if value == ()
+    }
+    assert set(vars(World())) - empty <= names
+    assert [rows[0][f"world.friction.{name}"] for name in SCENE.contact_names] == [1.0] * 4
+    assert all(f"contacts.{name}.slip_mm" in rows[0] for name in SCENE.contact_names)
+
+
+def test_a_grid_s_value_decides_and_rows_say_what_a_failure_began_with(story):
+    rows = story.rows
+    margin = [row for row in rows if row["controller"] == "margin"]
+    slippery = [row for row in margin if row["world.friction"] == 0.5]
+    # Synthesis with 80 % of the friction holds where there is all of it, not where half is missing.
+    assert [row["success"] for row in margin if row["world.friction"] == 1.0] == [True, True]
+    assert [row["success"] for row in slippery] == [False, False]
+    for row in slippery:
+        assert row["category"] in ("slip", "lost", "tilt")
+        assert row["cause"].startswith(row["category"])
+        assert 0.0 < row["failed_at_s"] <= row["timing.sim_s"]
+
+
+def test_the_command_of_a_row_replays_it_bit_for_bit(story, tmp_path, monkeypatch, capsys):
+    rows = story.rows
+    monkeypatch.setitem(scenarios(), SCENE.name, SCENE)
+    row = next(r for r in rows if r["controller"] == "margin" and not r["success"])
+    command = shlex.split(row["replay"])
+    assert command[0] == "fulcrum"
+    main([*command[1:], "--out", str(tmp_path / "replay")])
+    report = flat(json.loads((tmp_path / "replay" / "report.json").read_text()))
+    compared = {n: v for n, v in report.items() if n in row and n not in TIMES and n != "failures"}
+    assert len(compared) > 40
+    assert compared == {name: row[name] for name in compared}
+    assert " ".join(report["failures"]) == row["failures"]
+    assert row["cause"] in capsys.readouterr().out
+    # Another seed is another run.
+    other = next(r for r in rows if r["seed"] != row["seed"])
+    assert compared != {name: other[name] for name in compared}
 
 
 class Deadly(Sweep):

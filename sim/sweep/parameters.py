@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
@@ -160,12 +161,13 @@ def _values(field: str, text: str) -> list[float]:
         if len(parts) == 1:
             values = [float(text)]
         else:
-            first, last, count = parts
-            if not re.fullmatch(r"\s*\d{1,5}\s*", count) or int(count) < 2:
+            first, last = float(parts[0]), float(parts[1])
+            count = int(parts[2]) if re.fullmatch(r"\s*\d{1,5}\s*", parts[2]) else 0
+            if len(parts) != 3 or count < 2 or not math.isfinite(last - first):
                 raise ValueError
-            spaced = np.linspace(float(first), float(last), int(count))
+            spaced = np.linspace(first, last, count)
             values = np.round(spaced, _DIGITS).tolist()
-    except ValueError:
+    except (ValueError, IndexError):
         raise InvalidInputError(field, repr(text), valid) from None
     if not np.isfinite(values).all():
         raise InvalidInputError(field, repr(text), valid)
