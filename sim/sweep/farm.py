@@ -23,8 +23,12 @@ from synthesis import FulcrumError, InvalidInputError
 
 # How long a scheduler may take to answer, and its first worker to come [s].
 _PATIENCE_S = 10
-# What workers have to say the driver says, or writes into rows.
-_QUIET = {"distributed.nanny.pre-spawn-environ.DASK_LOGGING__DISTRIBUTED": "critical"}
+_SETTINGS = {
+    # What workers have to say the driver says, or writes into rows.
+    "distributed.nanny.pre-spawn-environ.DASK_LOGGING__DISTRIBUTED": "critical",
+    # Nobody reads Dask's profile, which it takes a hundred times a second in every process.
+    "distributed.worker.profile.enabled": False,
+}
 
 # Called with episodes finished, episodes in total and failures so far.
 Progress = Callable[[int, int, int], None]
@@ -125,13 +129,13 @@ def _cluster(workers: Workers) -> Iterator[Client]:
     with contextlib.ExitStack() as stack:
         if workers.scheduler is None:
             logging.getLogger("distributed").setLevel(logging.CRITICAL)
-            stack.enter_context(dask.config.set(_QUIET))
+            stack.enter_context(dask.config.set(_SETTINGS))
             address = stack.enter_context(
                 LocalCluster(
                     n_workers=workers.count or os.cpu_count() or 1,
                     threads_per_worker=1,
                     processes=True,
-                    dashboard_address=None,
+                    dashboard_address="127.0.0.1:0",  # only for its own use; there is no dashboard
                     silence_logs=logging.CRITICAL,
                     preload="sim.sweep.quiet",
                 )

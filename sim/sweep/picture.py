@@ -54,9 +54,9 @@ def draw_map(rows: pa.Table, sweep: Sweep, pair: tuple[str, str], path: Path) ->
         axes.set_xlabel(_label(pair[0]))
     panels[0].set_ylabel(_label(pair[1]))
     figure.colorbar(panels[0].collections[0], ax=panels.tolist(), label="share of successes")
-    each = f"{sweep.episodes} seeds" if not grid else f"{sweep.episodes} seeds at each point"
+    each = f"worlds drawn: {sweep.episodes}" + (" at each point" if grid else "")
     crosses = "" if set(pair) <= set(grid) else "; crosses are failures"
-    figure.suptitle(f"{sweep.scenario.name}, worlds {sweep.preset}, {each}{crosses}", fontsize=10)
+    figure.suptitle(f"{sweep.scenario.name}, {sweep.preset}; {each}{crosses}", fontsize=10)
     figure.savefig(path, dpi=130)
 
 

@@ -6,6 +6,7 @@ import json
 import os
 import shutil
 from pathlib import Path
+from typing import Any
 
 import pyarrow as pa
 import pyarrow.parquet as pq
@@ -22,6 +23,8 @@ CONFIG, PARTS, EPISODES, SUMMARY, MAP = (
     "sweep.json",
     "map.png",
 )
+# What helps to search many rows makes a file of one row twice as long.
+_LEAN = {"use_dictionary": False, "write_statistics": False}
 
 
 class Store:
@@ -75,7 +78,7 @@ class Store:
     def write(self, episode: Episode, row: Row) -> None:
         """Keeps a finished episode: on the disk, and whole, when this returns."""
         path = self._parts / f"{episode.name}.parquet"
-        _write(pa.Table.from_pylist([row]), path)
+        _write(pa.Table.from_pylist([row]), path, _LEAN)
 
     def read(self) -> pa.Table:
         """All finished episodes in their order."""
@@ -90,16 +93,16 @@ class Store:
         """All episodes as one file, when none is missing; the files of each are removed."""
         table = self.read()
         if not (self.folder / EPISODES).is_file():
-            _write(table, self.folder / EPISODES)
+            _write(table, self.folder / EPISODES, {"compression": "zstd"})
         shutil.rmtree(self._parts, ignore_errors=True)
         return table
 
 
-def _write(table: pa.Table, path: Path) -> None:
+def _write(table: pa.Table, path: Path, options: dict[str, Any]) -> None:
     """Writes a file that is there whole or not at all, whatever happens meanwhile."""
     partial = path.with_suffix(".partial")
     with partial.open("wb") as file:
-        pq.write_table(table, file, compression="zstd")
+        pq.write_table(table, file, **options)
         file.flush()
         os.fsync(file.fileno())
     partial.replace(path)
