@@ -6,12 +6,14 @@ r"""The drives: joint impedance at the physics' rate along the path, and the for
 with :math:`f^*` the forces of the last setpoint that has arrived, s the share of grip that the
 schedule asks for and D the joints' viscous friction. The mass matrix M gives every joint, light or
 heavy, the same bandwidth :math:`\omega`: damping that is explicit in time stays stable on light
-wrists.
+wrists. A joint whose encoder is dead has no impedance. Whatever comes in, what goes out is finite
+and within the limits.
 """
 
 from __future__ import annotations
 
 import math
+from bisect import bisect_right
 
 import numpy as np
 
@@ -19,7 +21,7 @@ from sim.channel import Setpoint
 from sim.plant import Measurement
 from sim.references import Target
 from sim.robot import RobotModel
-from synthesis.contact import Array
+from synthesis.contact import Array, Mask
 
 
 class Drives:
@@ -27,6 +29,7 @@ class Drives:
 
     Attributes:
         tau_g: Torques that hold the robot up, as of the last update of the model (l,).
+        tau_pull: Torques with which the impedance last pulled the joints to their path (l,).
         w_held: Wrenches on the object that the last torques were to make [N, N·m], (m, 6).
     """
 
@@ -34,11 +37,15 @@ class Drives:
         """Takes over the model of the robot, which whoever updates it shares [rad/s]."""
         self._robot, self._bandwidth = robot, bandwidth
         joints = len(robot.joints)
-        self.tau_g = np.zeros(joints)
+        self.tau_g, self.tau_pull = np.zeros((2, joints))
         self._setpoint = Setpoint(np.zeros(joints), np.zeros((contacts, 6)))
         self._share, self._tau_held, self.w_held = math.nan, self.tau_g, self._setpoint.w_OC_C
         # Deviations of angles and speeds, and torques per each of them: both terms in one product.
         self._deviation, self._gains = np.zeros((2, joints)), np.zeros((joints, 2, joints))
+        self._sent = np.zeros(joints)
+        # Setpoints by path time, in the order of both.
+        self._times: list[float] = []
+        self._memory: list[Setpoint] = []
 
     def update_model(self, q: Array) -> None:
         """Takes over joint angles [rad or m], (l,), for gravity and gains until the next update."""
@@ -53,8 +60,20 @@ class Drives:
         self._setpoint = setpoint
         self._share = math.nan
 
+    def remember(self, path_t: float) -> None:
+        """Keeps the present setpoint as that of a path time [s] after all that are kept."""
+        self._times.append(path_t)
+        self._memory.append(self._setpoint)
+
+    def recall(self, path_t: float) -> None:
+        """Takes over the setpoint that held at a path time [s], if any is kept."""
+        if self._memory:
+            setpoint = self._memory[max(0, bisect_right(self._times, path_t) - 1)]
+            if setpoint is not self._setpoint:
+                self.follow(setpoint)
+
     def torques(
-        self, measurement: Measurement, target: Target, share: float
+        self, measurement: Measurement, target: Target, share: float, dead: Mask | None = None
     ) -> tuple[Array, Array]:
         """Torques [N·m or N], (l,), and which of them were cut at their limit.
 
@@ -62,13 +81,21 @@ class Drives:
             measurement: The present state of the joints.
             target: Where they should be.
             share: Of the setpoint's forces that is applied [-].
+            dead: Joints without impedance, (l,); None if there are none.
         """
         np.subtract(target.q, measurement.q, self._deviation[0])
         np.subtract(target.qd, measurement.qd, self._deviation[1])
-        tau = self._gains.reshape(len(target.q), -1).dot(self._deviation.reshape(-1))
-        tau += self._robot.damping * target.qd
+        if dead is not None:
+            self._deviation[:, dead] = 0.0
+        pull = self._gains.reshape(len(target.q), -1).dot(self._deviation.reshape(-1))
+        if dead is not None:
+            pull[dead] = 0.0
+        self.tau_pull = pull
+        tau = pull + self._robot.damping * target.qd
         tau += self._held(share)
-        limited = np.minimum(np.maximum(tau, self._robot.tau_min), self._robot.tau_max)
+        if math.isnan(tau.dot(tau)):  # a limit cuts infinities, but lets NaN pass
+            tau = np.where(np.isnan(tau), self._sent, tau)
+        self._sent = limited = np.minimum(np.maximum(tau, self._robot.tau_min), self._robot.tau_max)
         return limited, limited != tau
 
     def _held(self, share: float) -> Array:

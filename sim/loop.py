@@ -10,6 +10,7 @@ from dm_control.rl.control import PhysicsError
 from sim.channel import Channel
 from sim.contacts import ContactFrames
 from sim.controller import Controller
+from sim.guard import Event
 from sim.ik import JointPath, plan_joints
 from sim.path import ScrewPath
 from sim.plant import Measurement, Plant
@@ -38,9 +39,7 @@ class ClosedLoop:
     Attributes:
         truth: What the plant is.
         robot: The controller's belief about the robot.
-        trace: The whole run; filled up to ``steps`` rows.
         steps: How many steps have been made.
-        total_steps: How many the schedule asks for.
     """
 
     def __init__(
@@ -71,18 +70,32 @@ class ClosedLoop:
         joint_path = joint_path or plan_joints(scenario)
         self.truth = world.truth(truth or scenario)
         self._controller = Controller(scenario, control, robot, joint_path, Channel(world))
-        self._sensors = Sensors(world)
         self._plant = Plant(self.truth, world)
+        self._sensors = Sensors(world, self._plant.joints)
         deviation = np.random.default_rng(seed).normal(size=len(robot.joints))
         self._plant.reset(joint_path.start + scenario.robot.start_deviation * deviation)
-        dt = self.truth.physics.timestep
+        self._dt = dt = self.truth.physics.timestep
         self.steps = 0
-        self.total_steps = round(joint_path.schedule.total_s / dt)
         self._block = max(1, round(_BLOCK_S / dt))
-        self.trace = Trace.allocate(
+        self._trace = Trace.allocate(
             self.total_steps, len(robot.joints), len(scenario.hands), len(scenario.contact_names)
         )
         self._p_WC = ContactFrames(scenario).points(*self._path.pose(0.0))
+
+    @property
+    def trace(self) -> Trace:
+        """The run so far."""
+        return self._trace.rows(0, self.steps)
+
+    @property
+    def total_steps(self) -> int:
+        """How many steps the run takes as things stand."""
+        return self.steps + max(0, round(self._controller.left_s(self.steps * self._dt) / self._dt))
+
+    @property
+    def events(self) -> tuple[Event, ...]:
+        """What went wrong so far, and what was done about it."""
+        return self._controller.events
 
     @property
     def collisions(self) -> dict[tuple[str, str], float]:
@@ -98,6 +111,8 @@ class ClosedLoop:
         while self.steps < self.total_steps:
             start = self.steps
             stop = min(start + self._block, self.total_steps)
+            if stop > len(self._trace):
+                self._trace = self._trace.grown(len(self._trace))
             diverged: PhysicsError | None = None
             for row in range(start, stop):
                 try:
@@ -106,12 +121,12 @@ class ClosedLoop:
                     diverged = error
                     break
                 self.steps = row + 1
-            block = self.trace.rows(start, self.steps)
+            block = self._trace.rows(start, self.steps)
             if len(block):
                 self._complete(block)
                 yield block
             if diverged is not None:
-                raise DivergedError(float(self.trace.t[self.steps])) from diverged
+                raise DivergedError(float(self._trace.t[self.steps])) from diverged
 
     def _complete(self, block: Trace) -> None:
         """Fills the columns that are worked out for a whole block at once."""
@@ -126,13 +141,13 @@ class ClosedLoop:
         self._p_WC = block.p_WC[-1]
 
     def _step(self, row: int, step: int) -> None:
-        trace, plant = self.trace, self._plant
+        trace, plant = self._trace, self._plant
         measurement = plant.measure()
         self._write_state(row, measurement)
         command = self._controller.command(self._sensors.see(measurement))
         plant.apply(command.tau)
         plant.step()
-        trace.phase[row] = command.phase
+        trace.phase[row], trace.mode[row] = command.phase, command.mode
         trace.q_ref[row], trace.tilt_ref[row] = command.q_ref, command.tilt_ref
         trace.tau[row], trace.saturated[row] = command.tau, command.saturated
         trace.w_command_C[row] = command.w_OC_C
@@ -140,7 +155,7 @@ class ClosedLoop:
         plant.log(step)
 
     def _write_state(self, row: int, measurement: Measurement) -> None:
-        trace = self.trace
+        trace = self._trace
         trace.t[row] = measurement.t
         trace.q[row], trace.qd[row] = measurement.q, measurement.qd
         trace.p_WO[row], trace.quat_WO[row] = measurement.p_WO, measurement.quat_WO

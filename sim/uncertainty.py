@@ -182,7 +182,7 @@ def _one_per_pair(scenario: Scenario, friction: Array) -> tuple[float, ...]:
 def _push(
     u: Uncertainty, scenario: Scenario, scene: mujoco.MjModel, random: np.random.Generator
 ) -> Push:
-    """At any time while the object is held, in any direction, anywhere within the object's bounds."""
+    """At any time while the object is held, in any direction, anywhere in the object's bounds."""
     schedule = Schedule(scenario)
     held = np.flatnonzero(schedule.held)
     first, last = (schedule.starts[held[0]], schedule.ends[held[-1]]) if len(held) else (0.0, 0.0)

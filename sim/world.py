@@ -12,7 +12,8 @@ import numpy as np
 
 from sim.checks import finite, not_negative, positive
 from sim.contacts import contact_axes
-from sim.scenario import Friction, Hand, Object, Rest, Scenario, Support, Vector
+from sim.faults import Fault
+from sim.scenario import Friction, Geom, Hand, Object, Rest, Scenario, Support, Vector
 from sim.scene import hand_body, tip_site
 from synthesis import InvalidInputError
 
@@ -66,6 +67,8 @@ class World:
         latency: Time from measurement to effect of the outer loop [s].
         dropped: Share of the outer loop's ticks whose results get lost [-].
         pushes: Forces on the object.
+        obstacles: What stands in the world besides the environment that is believed.
+        faults: What breaks during the run.
     """
 
     seed: int = 0
@@ -85,6 +88,8 @@ class World:
     latency: float = 0.0
     dropped: float = 0.0
     pushes: tuple[Push, ...] = ()
+    obstacles: tuple[Geom, ...] = ()
+    faults: tuple[Fault, ...] = ()
 
     def __post_init__(self) -> None:
         if self.seed < 0:
@@ -125,6 +130,7 @@ class World:
         return replace(
             scenario,
             object=self._object(scenario.object),
+            environment=(*scenario.environment, *self.obstacles),
             hands=hands,
             supports=supports,
             rests=tuple(_rest(rest, supports) for rest in scenario.rests),
@@ -170,6 +176,10 @@ class World:
         joints = [int(model.actuator(i).trnid[0]) for i in range(model.nu)]
         for name in ("link_mass", "joint_friction", "torque_gain", "torque_offset"):
             _check_length(name, getattr(self, name), len(joints))
+        names = [model.joint(joint).name for joint in joints]
+        for fault in self.faults:
+            if fault.joint and fault.joint not in names:
+                raise InvalidInputError("fault.joint", fault.joint, f"one of {', '.join(names)}")
         for hand, place in zip(scenario.hands, self.hand_place, strict=False):
             pad, site = model.body(hand_body(hand)).id, model.site(tip_site(hand)).id
             offset = np.array([*place, 0.0])
