@@ -29,10 +29,10 @@ from synthesis import (
     UnboundedError,
 )
 from synthesis.best_effort import BestEffort, best_effort
-from synthesis.contact import Array
+from synthesis.contact import Array, Mask
 
 # Time between looks at the run's health [s].
-_CHECK_S = 0.004
+_CHECK_S = 0.01
 
 
 @dataclass(eq=False, slots=True)  # one every step, and a frozen one takes thrice as long
@@ -53,7 +53,7 @@ class Command:
     """
 
     tau: Array
-    saturated: Array
+    saturated: Mask
     phase: int
     mode: Mode
     q_ref: Array
@@ -132,7 +132,7 @@ class Controller:
             self._failing_t, self._heard_t = None, t
         if self._tick % self._control.solve_every == 0:
             self._drives.update_model(seen.q)
-            if not free and self._health.sees_object:
+            if not free and self._health.sees_object(seen):
                 started = time.perf_counter()
                 forces = self._synthesize(seen)
                 synthesis_s = time.perf_counter() - started

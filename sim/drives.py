@@ -74,7 +74,7 @@ class Drives:
 
     def torques(
         self, measurement: Measurement, target: Target, share: float, dead: Mask | None = None
-    ) -> tuple[Array, Array]:
+    ) -> tuple[Array, Mask]:
         """Torques [N·m or N], (l,), and which of them were cut at their limit.
 
         Args:

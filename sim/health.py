@@ -19,8 +19,8 @@ from synthesis.contact import Array, Mask
 # No joint turns or moves that far, or that fast, unless its encoder is broken [rad, m, or per s].
 _PLAUSIBLE = 1e3
 # A sensor that repeats its value to the last bit while its reference moves as far is frozen.
-_FROZEN_JOINT = 0.005  # [rad or m]
-_FROZEN_TILT = math.radians(1.0)
+_FROZEN_JOINT = 0.001  # [rad or m]
+_FROZEN_TILT = math.radians(0.3)
 # Pose noise of half a degree per sample is no tilt error: time constant of its filter [s].
 _FILTER_S = 0.05
 # How long what is no matter of single samples must last [s].
@@ -46,7 +46,6 @@ class Health:
 
     Attributes:
         dead: Joints whose encoders give nothing usable, (l,); None if all do.
-        sees_object: Whether the object's pose is usable.
     """
 
     def __init__(
@@ -62,15 +61,13 @@ class Health:
         self._tau_limit = np.maximum(robot.tau_max, -robot.tau_min)
         self._torque_error = settings.torque_error * self._tau_limit
         self._q, self._q_seen, self._q_moved = start, start, start
-        self._pose, self._tilt_moved = np.zeros(7), 0.0
-        self._tracked, self._pose_frozen = True, False
+        self._pose, self._tilt_moved, self._pose_frozen = b"", 0.0, False
         self._lost: Mask | None = None
         self._tilt_error = 0.0
         self._since: dict[Cause, float] = {}
         self._checked = -math.inf
         self.dead: Mask | None = None
         self._broken: Mask | None = None
-        self.sees_object = True
 
     @property
     def uncontrolled(self) -> Mask | None:
@@ -90,10 +87,11 @@ class Health:
         elif self._lost is not None:
             self._lost = self.dead = None
         self._q = measurement.q
-        p_WO, quat_WO = measurement.p_WO, measurement.quat_WO
-        self._tracked = p_WO.dot(p_WO) + quat_WO.dot(quat_WO) < _PLAUSIBLE**2
-        self.sees_object = self._tracked and not self._pose_frozen
         return measurement
+
+    def sees_object(self, measurement: Measurement) -> bool:
+        """Whether the object's pose is usable."""
+        return not self._pose_frozen and _tracked(measurement)
 
     def check(
         self,
@@ -120,7 +118,7 @@ class Health:
         found += self._object(measurement, target, held)
         if failing_s > settings.no_forces_s:
             found.append(Finding(Cause.FORCES, "the synthesis finds no forces"))
-        elif silent_s > settings.silence_s and failing_s == 0.0 and self.sees_object:
+        elif silent_s > settings.silence_s and failing_s == 0.0 and self.sees_object(measurement):
             text = f"no setpoint has arrived for {1e3 * silent_s:.0f} ms"
             found.append(Finding(Cause.SILENCE, text))
         found += self._joints(measurement, target, sent)
@@ -188,16 +186,17 @@ class Health:
     def _object(self, measurement: Measurement, target: Target, held: bool) -> list[Finding]:
         """Whether the object is seen, is where the hands are, and has the tilt it should have."""
         t, settings = measurement.t, self._settings
-        pose = np.concatenate([measurement.p_WO, measurement.quat_WO])
-        if not self._tracked or (pose != self._pose).any():
+        pose = measurement.p_WO.tobytes() + measurement.quat_WO.tobytes()
+        tracked = _tracked(measurement)
+        if not tracked or pose != self._pose:
             self._pose, self._tilt_moved = pose, target.tilt
         self._pose_frozen = abs(target.tilt - self._tilt_moved) > _FROZEN_TILT
-        self.sees_object = self._tracked and not self._pose_frozen
-        blind_s = self._lasts(Cause.POSE, t, not self.sees_object)
-        if not self.sees_object:
+        seen = tracked and not self._pose_frozen
+        blind_s = self._lasts(Cause.POSE, t, not seen)
+        if not seen:
             if blind_s <= settings.blind_s:
                 return []
-            what = "is frozen" if self._tracked else "gives no usable number"
+            what = "is frozen" if tracked else "gives no usable number"
             return [Finding(Cause.POSE, f"the tracking of the object {what}")]
         w, along = self._twist.dot(measurement.quat_WO).tolist()
         error = math.remainder(2.0 * math.atan2(along, w) - target.tilt, 2.0 * math.pi)
@@ -221,7 +220,13 @@ class Health:
         R_WO = np.empty((3, 3))
         mujoco.mju_quat2Mat(R_WO.reshape(9), measurement.quat_WO)
         off = self._p_OT_O.dot(R_WO.T) + measurement.p_WO - self._robot.tips()
-        return np.sqrt((off * off).sum(axis=1))
+        return np.sqrt(np.einsum("ni,ni->n", off, off))
+
+
+def _tracked(measurement: Measurement) -> bool:
+    """Whether the tracking of the object gives numbers that can be a pose."""
+    p_WO, quat_WO = measurement.p_WO, measurement.quat_WO
+    return bool(p_WO.dot(p_WO) < _PLAUSIBLE**2 and 0.0 < quat_WO.dot(quat_WO) < _PLAUSIBLE**2)
 
 
 def _twist_of(scenario: Scenario) -> Array:

@@ -101,7 +101,7 @@ class Guard:
     contact_error: float = 0.05
     hold_s: float = 0.5
     holds_s: float = 5.0
-    lower_s: float = 1.0
+    lower_s: float = 2.0
 
     def __post_init__(self) -> None:
         for field in fields(self):
