@@ -64,6 +64,7 @@ class ClosedLoop:
         Raises:
             InvalidInputError: The world does not fit the scenario.
             PathError: The arms cannot follow the path.
+            DivergedError: The start's state is more than numbers can hold.
         """
         self._path = ScrewPath(scenario.path)
         self.robot = robot = RobotModel(scenario)
@@ -73,7 +74,10 @@ class ClosedLoop:
         self._plant = Plant(self.truth, world)
         self._sensors = Sensors(world, self._plant.joints)
         deviation = np.random.default_rng(seed).normal(size=len(robot.joints))
-        self._plant.reset(joint_path.start + scenario.robot.start_deviation * deviation)
+        try:
+            self._plant.reset(joint_path.start + scenario.robot.start_deviation * deviation)
+        except PhysicsError as error:
+            raise DivergedError(0.0) from error
         self._dt = dt = self.truth.physics.timestep
         self.steps = 0
         self._block = max(1, round(_BLOCK_S / dt))

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, fields, replace
 
-from sim.checks import not_negative, positive, whole
+from sim.checks import length, not_negative, positive, whole
 from synthesis import InvalidInputError, Objective
 
 # A trace takes about 2 kB per step: a gigabyte in this time [s].
@@ -181,7 +181,9 @@ class Physics:
         positive("physics.timestep", self.timestep)
         positive("physics.impratio", self.impratio)
         whole("physics.noslip_iterations", self.noslip_iterations, least=0)
+        length("physics.solimp", self.solimp, 3)
         for name in ("solref", "solref_friction"):
+            length(f"physics.{name}", getattr(self, name), 2)
             for value in getattr(self, name):
                 positive(f"physics.{name}", value)
         d0, dmax, width = self.solimp

@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 import mujoco
 import numpy as np
 
-from sim.checks import finite, not_negative, positive
+from sim.checks import finite, not_negative, positive, vector
 from sim.contacts import contact_axes
 from sim.faults import Fault
 from sim.scenario import Friction, Geom, Hand, Object, Rest, Scenario, Support, Vector
@@ -37,8 +37,8 @@ class Push:
     def __post_init__(self) -> None:
         not_negative("push.t", self.t)
         positive("push.duration_s", self.duration_s)
-        finite("push.force_W", self.force_W)
-        finite("push.p_OA_O", self.p_OA_O)
+        vector("push.force_W", self.force_W, 3)
+        vector("push.p_OA_O", self.p_OA_O, 3)
 
 
 @dataclass(frozen=True)
@@ -96,7 +96,7 @@ class World:
             raise InvalidInputError("world.seed", self.seed, "an integer >= 0")
         positive("world.mass", self.mass)
         positive("world.size", self.size)
-        finite("world.center_of_mass", self.center_of_mass)
+        vector("world.center_of_mass", self.center_of_mass, 3)
         for name in ("friction", "link_mass", "torque_gain"):
             for factor in getattr(self, name):
                 positive(f"world.{name}", factor)
@@ -104,7 +104,7 @@ class World:
             not_negative("world.joint_friction", friction)
         finite("world.torque_offset", self.torque_offset)
         for place in self.hand_place:
-            finite("world.hand_place", place)
+            vector("world.hand_place", place, 2)
         for name in ("torque_noise", "encoder_noise", "position_noise", "orientation_noise"):
             not_negative(f"world.{name}", getattr(self, name))
         not_negative("world.latency", self.latency)
