@@ -246,6 +246,8 @@ def _print_report(report: Report, out: Path) -> None:
     console.print(f"{report.scenario}, controller {report.controller}: {verdict}")
     for failure in report.failures:
         console.print(f"  - {failure}", highlight=False)
+    for event in report.events:
+        console.print(f"  {event.t:.3f} s: {event.cause}: {event.reaction}", highlight=False)
     table = Table("contact", "kept", "slip", "slide", "spin", "friction", "force error", box=SIMPLE)
     table.add_row(*map(escape, ("", "[%]", "[mm]", "[mm]", "[deg]", "[%]", "[N]")), style="dim")
     for name, c in report.contacts.items():

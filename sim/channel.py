@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from sim.faults import FaultKind, of_kinds
 from sim.world import World
 from synthesis.contact import Array
 
@@ -32,6 +33,7 @@ class Channel:
     def __init__(self, world: World) -> None:
         self._latency, self._dropped = world.latency, world.dropped
         self._random = np.random.default_rng([world.seed, 2])
+        self._silences = of_kinds(world.faults, FaultKind.SILENCE)
         self._sent: deque[tuple[float, Setpoint]] = deque()
 
     def send(self, t: float, setpoint: Setpoint) -> None:
@@ -43,6 +45,8 @@ class Channel:
     def receive(self, t: float) -> Setpoint | None:
         """The newest setpoint that has arrived since last asked; None if there is none."""
         newest = None
+        if any(silence.active(t) for silence in self._silences):
+            return None
         # Times are sums of steps, and so is the latency: half a nanosecond is rounding.
         while self._sent and self._sent[0][0] <= t + 5e-10:
             newest = self._sent.popleft()[1]

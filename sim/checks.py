@@ -29,6 +29,18 @@ def finite(field: str, vector: Sequence[float]) -> None:
         raise InvalidInputError(field, vector, "finite numbers")
 
 
+def length(field: str, values: Sequence[float], size: int) -> None:
+    """Refuses what are not so many numbers."""
+    if len(values) != size:
+        raise InvalidInputError(field, values, f"{size} numbers")
+
+
+def vector(field: str, values: Sequence[float], size: int) -> None:
+    """Refuses what are not so many finite numbers."""
+    length(field, values, size)
+    finite(field, values)
+
+
 def whole(field: str, value: object, least: int) -> None:
     """Refuses what is not an integer of at least ``least``."""
     if not isinstance(value, int) or isinstance(value, bool) or value < least:
@@ -39,9 +51,9 @@ def axes(
     field: str, normal: tuple[str, Sequence[float]], tangent: tuple[str, Sequence[float]]
 ) -> None:
     """Refuses a normal and a tangent, each with its name, that are not unit and perpendicular."""
-    for name, vector in (normal, tangent):
-        if not abs(math.hypot(*vector) - 1.0) < _DIRECTION:
-            raise InvalidInputError(f"{field}.{name}", vector, "a vector of length 1")
+    for name, values in (normal, tangent):
+        if len(values) != 3 or not abs(math.hypot(*values) - 1.0) < _DIRECTION:
+            raise InvalidInputError(f"{field}.{name}", values, "a vector of length 1")
     if not abs(sum(n * t for n, t in zip(normal[1], tangent[1], strict=True))) < _DIRECTION:
         raise InvalidInputError(
             f"{field}.{tangent[0]}", tangent[1], f"perpendicular to {normal[0]} {normal[1]}"

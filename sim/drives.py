@@ -6,7 +6,8 @@ r"""The drives: joint impedance at the physics' rate along the path, and the for
 with :math:`f^*` the forces of the last setpoint that has arrived, s the share of grip that the
 schedule asks for and D the joints' viscous friction. The mass matrix M gives every joint, light or
 heavy, the same bandwidth :math:`\omega`: damping that is explicit in time stays stable on light
-wrists.
+wrists. A joint whose encoder is dead has no impedance. Whatever comes in, what goes out is finite
+and within the limits.
 
 A stiff impedance would also oppose the squeeze, by which the hands sink into what they hold. So
 that the force there is the one asked for, it leaves the squeeze to the feed-forward: with J_n the
@@ -22,6 +23,7 @@ along their normals (Khatib 1987, the operational space formulation).
 from __future__ import annotations
 
 import math
+from bisect import bisect_right
 
 import numpy as np
 
@@ -31,7 +33,7 @@ from sim.references import Target
 from sim.robot import RobotModel
 from sim.scenario import Scenario
 from sim.settings import Control
-from synthesis.contact import Array, N
+from synthesis.contact import Array, Mask, N
 
 
 class Drives:
@@ -39,6 +41,7 @@ class Drives:
 
     Attributes:
         tau_g: Torques that hold the robot up, as of the last update of the model (l,).
+        tau_pull: Torques with which the impedance last pulled the joints to their path (l,).
         w_held: Wrenches on the object that the last torques were to make [N, N·m], (m, 6).
     """
 
@@ -46,13 +49,17 @@ class Drives:
         """Takes over the model of the robot, which whoever updates it shares."""
         self._robot, self._control = robot, control
         joints = len(robot.joints)
-        self.tau_g = np.zeros(joints)
+        self.tau_g, self.tau_pull = np.zeros((2, joints))
         contacts, hands = len(scenario.contact_names), len(scenario.hands)
         none = np.zeros(joints), np.zeros((contacts, 6)), np.zeros((hands, joints))
         self._setpoint = Setpoint(*none)
         self._share, self._tau_held, self.w_held = math.nan, self.tau_g, self._setpoint.w_OC_C
         # Deviations of angles and speeds, and torques per each of them: both terms in one product.
         self._deviation, self._gains = np.zeros((2, joints)), np.zeros((joints, 2, joints))
+        self._sent = np.zeros(joints)
+        # Setpoints by path time, in the order of both.
+        self._times: list[float] = []
+        self._memory: list[Setpoint] = []
 
     def update_model(self, q: Array) -> None:
         """Takes over joint angles [rad or m], (l,), for gravity and gains until the next update."""
@@ -79,22 +86,42 @@ class Drives:
         self._setpoint = setpoint
         self._share = math.nan
 
+    def remember(self, path_t: float) -> None:
+        """Keeps the present setpoint as that of a path time [s] after all that are kept."""
+        self._times.append(path_t)
+        self._memory.append(self._setpoint)
+
+    def recall(self, path_t: float) -> None:
+        """Takes over the setpoint that held at a path time [s], if any is kept."""
+        if self._memory:
+            setpoint = self._memory[max(0, bisect_right(self._times, path_t) - 1)]
+            if setpoint is not self._setpoint:
+                self.follow(setpoint)
+
     def torques(
-        self, measurement: Measurement, target: Target, share: float
-    ) -> tuple[Array, Array]:
+        self, measurement: Measurement, target: Target, share: float, dead: Mask | None = None
+    ) -> tuple[Array, Mask]:
         """Torques [N·m or N], (l,), and which of them were cut at their limit.
 
         Args:
             measurement: The present state of the joints.
             target: Where they should be.
             share: Of the setpoint's forces that is applied [-].
+            dead: Joints without impedance, (l,); None if there are none.
         """
         np.subtract(target.q, measurement.q, self._deviation[0])
         np.subtract(target.qd, measurement.qd, self._deviation[1])
-        tau = self._gains.reshape(len(target.q), -1).dot(self._deviation.reshape(-1))
-        tau += self._robot.damping * target.qd
+        if dead is not None:
+            self._deviation[:, dead] = 0.0
+        pull = self._gains.reshape(len(target.q), -1).dot(self._deviation.reshape(-1))
+        if dead is not None:
+            pull[dead] = 0.0
+        self.tau_pull = pull
+        tau = pull + self._robot.damping * target.qd
         tau += self._held(share)
-        limited = np.minimum(np.maximum(tau, self._robot.tau_min), self._robot.tau_max)
+        if math.isnan(tau.dot(tau)):  # a limit cuts infinities, but lets NaN pass
+            tau = np.where(np.isnan(tau), self._sent, tau)
+        self._sent = limited = np.minimum(np.maximum(tau, self._robot.tau_min), self._robot.tau_max)
         return limited, limited != tau
 
     def _held(self, share: float) -> Array:

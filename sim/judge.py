@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from sim.guard import Event
 from sim.monitor import ContactHistory
 from sim.report import (
     ContactReport,
@@ -22,6 +23,9 @@ from sim.scenario import Scenario
 from sim.schedule import Schedule
 from sim.trace import Trace
 from synthesis.contact import Array, Mask, N
+
+# Reactions after which a manoeuvre is not completed.
+_GIVEN_UP = {"lower": "broken off and the object lowered", "stop": "stopped"}
 
 
 class Judge:
@@ -55,6 +59,7 @@ class Judge:
             found += self._tilt_failures(tilt, trace)
             found += [_collision(*names, t) for names, t in info.collisions.items()]
             found += self._torque_failures(trace) + _synthesis_failures(trace)
+            found += [_gave_up(event) for event in info.events if event.reaction in _GIVEN_UP]
             found += [] if info.error is None else [_Failure(float(trace.t[-1]), info.error)]
             # In order of time, so that the first is the cause.
             failures = [failure.text for failure in sorted(found, key=lambda f: f.t)]
@@ -67,6 +72,7 @@ class Judge:
             seed=info.seed,
             verdict=verdict,
             failures=tuple(failures),
+            events=info.events,
             phases=self._phases(trace),
             tilt=tilt,
             contacts=contacts,
@@ -77,13 +83,14 @@ class Judge:
         )
 
     def _phases(self, trace: Trace) -> tuple[PhaseReport, ...]:
-        schedule, last = self._schedule, float(trace.t[-1])
+        names = [phase.name for phase in self._schedule.phases]
+        begun = np.flatnonzero(np.diff(trace.phase, prepend=-1.0))
+        starts = trace.t[begun].tolist()
         return tuple(
-            PhaseReport(phase.name, float(start), min(float(end), last))
-            for phase, start, end in zip(
-                schedule.phases, schedule.starts, schedule.ends, strict=True
+            PhaseReport(names[int(trace.phase[row])], start, end)
+            for row, start, end in zip(
+                begun, starts, [*starts[1:], float(trace.t[-1])], strict=True
             )
-            if start <= last
         )
 
     def _tilt(self, trace: Trace) -> TiltReport:
@@ -215,6 +222,11 @@ class _Failure:
 
 def _collision(first: str, second: str, t: float) -> _Failure:
     return _Failure(t, f"{first} touched {second} at {t:.2f} s.")
+
+
+def _gave_up(event: Event) -> _Failure:
+    did = _GIVEN_UP[event.reaction]
+    return _Failure(event.t, f"The run was {did} at {event.t:.2f} s: {event.cause}.")
 
 
 def _failure(trace: Trace, mask: Mask, text: str) -> _Failure:

@@ -11,6 +11,7 @@ from sim.channel import Channel
 from sim.contacts import ContactFrames
 from sim.controller import Controller
 from sim.grip import GripSchedule
+from sim.guard import Event
 from sim.ik import JointPath, plan_joints
 from sim.path import ScrewPath
 from sim.plant import Measurement, Plant
@@ -40,9 +41,7 @@ class ClosedLoop:
     Attributes:
         truth: What the plant is.
         robot: The controller's belief about the robot.
-        trace: The whole run; filled up to ``steps`` rows.
         steps: How many steps have been made.
-        total_steps: How many the schedule asks for.
     """
 
     def __init__(
@@ -70,6 +69,7 @@ class ClosedLoop:
             InvalidInputError: The world does not fit the scenario.
             PathError: The arms cannot follow the path.
             RobustInfeasibleError: No grip holds even the nominal object somewhere on the path.
+            DivergedError: The start's state is more than numbers can hold.
         """
         self._path = ScrewPath(scenario.path)
         self.robot = robot = RobotModel(scenario)
@@ -77,18 +77,35 @@ class ClosedLoop:
         self.truth = world.truth(truth or scenario)
         grip = grip or plan_grip(scenario, control, joint_path)
         self._controller = Controller(scenario, control, robot, joint_path, Channel(world), grip)
-        self._sensors = Sensors(world)
         self._plant = Plant(self.truth, world)
+        self._sensors = Sensors(world, self._plant.joints)
         deviation = np.random.default_rng(seed).normal(size=len(robot.joints))
-        self._plant.reset(joint_path.start + scenario.robot.start_deviation * deviation)
-        dt = self.truth.physics.timestep
+        try:
+            self._plant.reset(joint_path.start + scenario.robot.start_deviation * deviation)
+        except PhysicsError as error:
+            raise DivergedError(0.0) from error
+        self._dt = dt = self.truth.physics.timestep
         self.steps = 0
-        self.total_steps = round(joint_path.schedule.total_s / dt)
         self._block = max(1, round(_BLOCK_S / dt))
-        self.trace = Trace.allocate(
+        self._trace = Trace.allocate(
             self.total_steps, len(robot.joints), len(scenario.hands), len(scenario.contact_names)
         )
         self._p_WC = ContactFrames(scenario).points(*self._path.pose(0.0))
+
+    @property
+    def trace(self) -> Trace:
+        """The run so far."""
+        return self._trace.rows(0, self.steps)
+
+    @property
+    def total_steps(self) -> int:
+        """How many steps the run takes as things stand."""
+        return self.steps + max(0, round(self._controller.left_s(self.steps * self._dt) / self._dt))
+
+    @property
+    def events(self) -> tuple[Event, ...]:
+        """What went wrong so far, and what was done about it."""
+        return self._controller.events
 
     @property
     def collisions(self) -> dict[tuple[str, str], float]:
@@ -104,6 +121,8 @@ class ClosedLoop:
         while self.steps < self.total_steps:
             start = self.steps
             stop = min(start + self._block, self.total_steps)
+            if stop > len(self._trace):
+                self._trace = self._trace.grown(len(self._trace))
             diverged: PhysicsError | None = None
             for row in range(start, stop):
                 try:
@@ -112,12 +131,12 @@ class ClosedLoop:
                     diverged = error
                     break
                 self.steps = row + 1
-            block = self.trace.rows(start, self.steps)
+            block = self._trace.rows(start, self.steps)
             if len(block):
                 self._complete(block)
                 yield block
             if diverged is not None:
-                raise DivergedError(float(self.trace.t[self.steps])) from diverged
+                raise DivergedError(float(self._trace.t[self.steps])) from diverged
 
     def _complete(self, block: Trace) -> None:
         """Fills the columns that are worked out for a whole block at once."""
@@ -132,13 +151,13 @@ class ClosedLoop:
         self._p_WC = block.p_WC[-1]
 
     def _step(self, row: int, step: int) -> None:
-        trace, plant = self.trace, self._plant
+        trace, plant = self._trace, self._plant
         measurement = plant.measure()
         self._write_state(row, measurement)
         command = self._controller.command(self._sensors.see(measurement))
         plant.apply(command.tau)
         plant.step()
-        trace.phase[row] = command.phase
+        trace.phase[row], trace.mode[row] = command.phase, command.mode
         trace.q_ref[row], trace.tilt_ref[row] = command.q_ref, command.tilt_ref
         trace.tau[row], trace.saturated[row] = command.tau, command.saturated
         trace.w_command_C[row] = command.w_OC_C
@@ -146,7 +165,7 @@ class ClosedLoop:
         plant.log(step)
 
     def _write_state(self, row: int, measurement: Measurement) -> None:
-        trace = self.trace
+        trace = self._trace
         trace.t[row] = measurement.t
         trace.q[row], trace.qd[row] = measurement.q, measurement.qd
         trace.p_WO[row], trace.quat_WO[row] = measurement.p_WO, measurement.quat_WO

@@ -9,6 +9,7 @@ import numpy as np
 
 from sim.contact_log import ContactLog, ContactReader
 from sim.contacts import rotations
+from sim.faults import Fault, FaultKind, of_kinds
 from sim.motion_log import MotionLog
 from sim.scenario import Scenario
 from sim.scene import compose
@@ -32,6 +33,7 @@ class Measurement:
         qd: Joint speeds [rad/s or m/s], (l,).
         p_WO: Position of the object [m], (3,).
         quat_WO: Orientation of the object, (4,), wxyz.
+        tau: What the motors made during the last step [N·m or N], (l,).
     """
 
     t: float
@@ -39,23 +41,33 @@ class Measurement:
     qd: Array
     p_WO: Array
     quat_WO: Array
+    tau: Array
 
 
 class Motors:
     """What the motors make of the torques they are asked for."""
 
-    def __init__(self, world: World, limits: Array) -> None:
+    def __init__(self, world: World, limits: Array, joints: tuple[str, ...]) -> None:
+        """Takes over what is true of the l motors, their limits, and their joints' names."""
         self._gain = np.array(world.torque_gain) if world.torque_gain else 1.0
         self._offset = np.array(world.torque_offset) if world.torque_offset else 0.0
         self._noise = world.torque_noise * limits
         self._noisy = world.torque_noise > 0.0
         self._random = np.random.default_rng([world.seed, 3])
+        self._joints = joints
+        self._faults = of_kinds(world.faults, FaultKind.TORQUE_LOST, FaultKind.TORQUE_STUCK)
+        self._stuck: dict[Fault, float] = {}
 
-    def torques(self, tau: Array) -> Array:
-        """Torques at the joints [N·m or N], (l,), before the motors saturate."""
+    def torques(self, t: float, tau: Array) -> Array:
+        """Torques at the joints [N·m or N], (l,), before the motors saturate, at a time [s]."""
         made = self._gain * tau + self._offset
         if self._noisy:
             made += self._noise * self._random.standard_normal(len(tau))
+        for fault in self._faults:
+            if fault.active(t):
+                joint = self._joints.index(fault.joint)
+                lost = fault.kind is FaultKind.TORQUE_LOST
+                made[joint] = 0.0 if lost else self._stuck.setdefault(fault, float(made[joint]))
         return made
 
 
@@ -96,8 +108,9 @@ class Plant:
         self._object = thing.id
         self._contacts, self._reader = ContactLog(), ContactReader(scenario, model)
         self._motion = MotionLog(scenario, model)
-        self._motors = Motors(world, model.actuator_ctrlrange[:, 1])
+        self._motors = Motors(world, model.actuator_ctrlrange[:, 1], self.joints)
         self._pushes = world.pushes
+        self._weights = of_kinds(world.faults, FaultKind.WEIGHT)
 
     @property
     def collisions(self) -> dict[tuple[str, str], float]:
@@ -116,7 +129,7 @@ class Plant:
 
     def apply(self, tau: Array) -> None:
         """Commands the motor torques [N·m or N], (l,), for the next step; the motors saturate."""
-        self._data.ctrl[:] = self._motors.torques(tau)
+        self._data.ctrl[:] = self._motors.torques(self._data.time, tau)
 
     def step(self) -> None:
         """One physics step.
@@ -124,12 +137,12 @@ class Plant:
         Raises:
             dm_control.rl.control.PhysicsError: The state has diverged.
         """
-        if self._pushes:
+        if self._pushes or self._weights:
             self._push()
         self.physics.step()
 
     def _push(self) -> None:
-        """Applies the pushes of this instant at their points on the object."""
+        """Applies the pushes of this instant at their points on the object, and extra weight."""
         data, body = self._data, self._object
         wrench = data.xfrc_applied[body]
         wrench[:] = 0.0
@@ -139,6 +152,9 @@ class Plant:
                 arm = data.xpos[body] + R_WO @ push.p_OA_O - data.xipos[body]
                 wrench[:3] += push.force_W
                 wrench[3:] += np.cross(arm, push.force_W)
+        for fault in self._weights:
+            if fault.active(data.time):
+                wrench[2] -= fault.extra_n
 
     def measure(self) -> Measurement:
         """The present state."""
@@ -150,6 +166,7 @@ class Plant:
             qd=data.qvel.take(self._qd),
             p_WO=pose[:3],
             quat_WO=pose[3:],
+            tau=data.actuator_force.copy(),
         )
 
     def tips(self, positions: Array, quaternions: Array, twists: Array) -> None:

@@ -7,6 +7,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from enum import StrEnum
 
+from sim.guard import Event
+
 
 class Verdict(StrEnum):
     """How a run ended."""
@@ -18,7 +20,7 @@ class Verdict(StrEnum):
 
 @dataclass(frozen=True)
 class PhaseReport:
-    """A phase that was begun: its name, and when it was [s]."""
+    """A stretch of the run in one phase: its name, and when it was [s]."""
 
     name: str
     start_s: float
@@ -88,7 +90,11 @@ class TimingReport:
 
 @dataclass(frozen=True)
 class Report:
-    """The result of a run, as ``report.json`` holds it; finite numbers only."""
+    """The result of a run, as ``report.json`` holds it; finite numbers only.
+
+    ``phases`` are in the order in which they were come through, backwards while lowering;
+    ``events`` is what the guard found, and what it did.
+    """
 
     scenario: str
     controller: str
@@ -96,6 +102,7 @@ class Report:
     seed: int
     verdict: Verdict
     failures: tuple[str, ...]
+    events: tuple[Event, ...]
     phases: tuple[PhaseReport, ...]
     tilt: TiltReport
     contacts: dict[str, ContactReport]
@@ -118,6 +125,7 @@ class RunInfo:
         error: What ended the run, if something did.
         recording: Name of the recording's file.
         collisions: Pairs of geoms that touched against the scenario's will, and when first [s].
+        events: What the guard found, and what it did.
     """
 
     controller: str
@@ -128,3 +136,4 @@ class RunInfo:
     error: str | None = None
     recording: str | None = None
     collisions: Mapping[tuple[str, str], float] = field(default_factory=dict)
+    events: tuple[Event, ...] = ()

@@ -14,7 +14,7 @@ import pinocchio as pin
 
 from assets import velocity_limits
 from sim.scenario import Scenario
-from sim.scene import compose, tip_site
+from sim.scene import compose, tip_geom, tip_site
 from synthesis import InvalidInputError, Joints
 from synthesis.contact import Array
 
@@ -28,6 +28,7 @@ class RobotModel:
         qd_max: Speed limits [rad/s or m/s], (l,).
         tau_min, tau_max: Torque limits [N·m or N], (l,).
         damping: Viscous joint friction [N·m·s/rad], (l,).
+        tip_radii: Of the hands' tips [m], (n,).
     """
 
     def __init__(self, scenario: Scenario) -> None:
@@ -55,6 +56,8 @@ class RobotModel:
         self._tau_g = np.zeros(len(self.joints))
         tips = [self._frame(tip_site(hand)) for hand in scenario.hands]
         self._tip_joints = [int(self._model.frames[tip].parentJoint) for tip in tips]
+        self._tip_places = [self._model.frames[tip].placement.translation.copy() for tip in tips]
+        self.tip_radii = np.array([scene.geom(tip_geom(h)).size[0] for h in scenario.hands])
 
     def _frame(self, name: str) -> int:
         if not self._model.existFrame(name):
@@ -72,6 +75,11 @@ class RobotModel:
     def gravity(self) -> Array:
         """Torque that holds the robot up against gravity [N·m or N], (l,)."""
         return self._tau_g
+
+    def tips(self) -> Array:
+        """Centres of the hands' tips in the world [m], (n, 3), at the last updated angles."""
+        places = zip(self._tip_joints, self._tip_places, strict=True)
+        return np.array([self._data.oMi[joint].act(place) for joint, place in places])
 
     def mass_matrix(self) -> Array:
         """Joint-space inertia [kg m^2 or kg], (l, l)."""

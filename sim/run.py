@@ -157,9 +157,10 @@ def execute(
             error=error,
             recording=None if out is None else RECORDING,
             collisions=loop.collisions,
+            events=loop.events,
         )
         history = ContactHistory.concatenate(histories)
-        trace = loop.trace.rows(0, len(history.kept))
+        trace = loop.trace
         report = judge.report(info, trace, history)
         if out is not None and recorder is not None:
             write_json(out / REPORT, dataclasses.asdict(report))
@@ -225,6 +226,9 @@ def markdown(report: Report) -> str:
     """The report as Markdown, for people who open the recording."""
     lines = [f"# {report.scenario}: {report.verdict.upper()}", ""]
     lines += [f"- {failure}" for failure in report.failures]
+    if report.events:
+        lines += ["", "| time s | found | done |", "|---|---|---|"]
+        lines += [f"| {e.t:.3f} | {e.cause} | {e.reaction} |" for e in report.events]
     tilt, torque = report.tilt, report.torque
     lines += [
         "",

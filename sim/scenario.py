@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, replace
 
-from sim.checks import axes, finite, not_negative, positive
+from sim.checks import axes, length, not_negative, positive, vector
 from sim.settings import HOLD, REACH, STANDOFF, TILT, Control, Phase, Physics, Tolerances
 from synthesis import InvalidInputError
 
@@ -21,6 +21,13 @@ class Pose:
 
     position: Vector = (0.0, 0.0, 0.0)
     quaternion: Quaternion = (1.0, 0.0, 0.0, 0.0)
+
+    def __post_init__(self) -> None:
+        vector("pose.position", self.position, 3)
+        vector("pose.quaternion", self.quaternion, 4)
+        # They are normalised where they are used, if their squares are numbers.
+        if not 1e-3 < math.hypot(*self.quaternion) < 1e3:
+            raise InvalidInputError("pose.quaternion", self.quaternion, "a quaternion of length 1")
 
 
 @dataclass(frozen=True)
@@ -46,8 +53,9 @@ class Geom:
     def __post_init__(self) -> None:
         for size in self.size:
             positive(f"{self.name}.size", size)
-        finite(f"{self.name}.pose", (*self.pose.position, *self.pose.quaternion))
-        finite(f"{self.name}.rgba", self.rgba)
+        if not 1 <= len(self.size) <= 3:
+            raise InvalidInputError(f"{self.name}.size", self.size, "one to three numbers")
+        vector(f"{self.name}.rgba", self.rgba, 4)
 
 
 @dataclass(frozen=True)
@@ -70,9 +78,10 @@ class Object:
 
     def __post_init__(self) -> None:
         positive(f"{self.name}.mass", self.mass)
+        length(f"{self.name}.inertia", self.inertia, 3)
         for moment in self.inertia:
             positive(f"{self.name}.inertia", moment)
-        finite(f"{self.name}.center_of_mass", self.center_of_mass)
+        vector(f"{self.name}.center_of_mass", self.center_of_mass, 3)
 
 
 @dataclass(frozen=True)
@@ -125,7 +134,7 @@ class Hand:
 
     def __post_init__(self) -> None:
         axes(self.name, ("normal_O", self.normal_O), ("tangent_O", self.tangent_O))
-        finite(f"{self.name}.p_OC_O", self.p_OC_O)
+        vector(f"{self.name}.p_OC_O", self.p_OC_O, 3)
         if not self.f_n_max > 0.0:
             raise InvalidInputError(f"{self.name}.f_n_max", self.f_n_max, "a number > 0")
 
@@ -154,7 +163,7 @@ class Support:
 
     def __post_init__(self) -> None:
         axes(self.name, ("normal_W", self.normal_W), ("tangent_W", self.tangent_W))
-        finite(f"{self.name}.p_OP_O", self.p_OP_O)
+        vector(f"{self.name}.p_OP_O", self.p_OP_O, 3)
 
 
 @dataclass(frozen=True)
@@ -277,6 +286,9 @@ class Scenario:
             if geom not in geoms:
                 raise InvalidInputError(f"{name}.geom", geom, f"one of {', '.join(geoms)}")
         surfaces = [g.name for g in self.environment]
+        for name in (*geoms, *surfaces):
+            if [*geoms, *surfaces].count(name) > 1:
+                raise InvalidInputError("geom names", name, "a name that no other geom has")
         placed = [(support.name, support.surface) for support in self.supports]
         placed += [("rest", rest.surface) for rest in self.rests]
         for name, surface in placed:

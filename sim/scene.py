@@ -90,7 +90,7 @@ def _set_options(spec: mujoco.MjSpec, scenario: Scenario) -> None:
 
 
 def _robot_with_hands(scenario: Scenario) -> mujoco.MjSpec:
-    robot = mujoco.MjSpec.from_file(str(asset_path(scenario.robot.model)))
+    robot = _asset("robot.model", scenario.robot.model)
     _check_posture(robot, scenario)
     for hand in scenario.hands:
         mount = robot.body(hand.mount)
@@ -115,6 +115,14 @@ def _robot_with_hands(scenario: Scenario) -> mujoco.MjSpec:
     return robot
 
 
+def _asset(field: str, name: str) -> mujoco.MjSpec:
+    try:
+        path = asset_path(name)
+    except FileNotFoundError as missing:
+        raise InvalidInputError(field, repr(name), str(missing).partition("valid is ")[2]) from None
+    return mujoco.MjSpec.from_file(str(path))
+
+
 def _check_posture(robot: mujoco.MjSpec, scenario: Scenario) -> None:
     """Refuses start angles of joints that do not exist, or outside a joint's range."""
     model = robot.copy().compile()
@@ -128,7 +136,7 @@ def _check_posture(robot: mujoco.MjSpec, scenario: Scenario) -> None:
 
 
 def _hand_model(hand: Hand) -> mujoco.MjSpec:
-    model = mujoco.MjSpec.from_file(str(asset_path(hand.model)))
+    model = _asset(f"{hand.name}.model", hand.model)
     for kind, part in (("body", "pad"), ("geom", "tip"), ("site", "tip_center")):
         if getattr(model, kind)(part) is None:
             raise InvalidInputError(f"{hand.name}.model", hand.model, f"one with a {kind} {part}")

@@ -1,10 +1,11 @@
-"""What the controller sees of the plant's state: the truth, with noise."""
+"""What the controller sees of the plant's state: the truth, with noise, or what is broken."""
 
 from __future__ import annotations
 
 import mujoco
 import numpy as np
 
+from sim.faults import Fault, FaultKind, of_kinds
 from sim.plant import Measurement
 from sim.world import World
 from synthesis.contact import Array
@@ -16,8 +17,13 @@ _SPEED_FILTER = 100.0  # [rad/s]
 class Sensors:
     """Encoders and the tracking of the object."""
 
-    def __init__(self, world: World) -> None:
-        self._world = world
+    def __init__(self, world: World, joints: tuple[str, ...]) -> None:
+        """Takes over what is true, and the names of the l joints that are measured."""
+        self._world, self._joints = world, joints
+        encoders = FaultKind.ENCODER_FROZEN, FaultKind.ENCODER_DEAD
+        self._encoder_faults = of_kinds(world.faults, *encoders)
+        self._pose_faults = of_kinds(world.faults, FaultKind.POSE_FROZEN, FaultKind.POSE_DEAD)
+        self._frozen: dict[Fault, Array] = {}
         self._random = np.random.default_rng([world.seed, 1])
 
     def see(self, truth: Measurement) -> Measurement:
@@ -32,7 +38,32 @@ class Sensors:
             turned = truth.quat_WO.copy()
             mujoco.mju_quatIntegrate(turned, self._noise(world.orientation_noise, 3), 1.0)
             truth.quat_WO = turned
+        if self._encoder_faults:
+            self._break_encoders(truth)
+        if self._pose_faults:
+            self._break_tracking(truth)
         return truth
+
+    def _break_encoders(self, seen: Measurement) -> None:
+        states = np.array([seen.q, seen.qd])
+        for fault in self._encoder_faults:
+            if fault.active(seen.t):
+                joint = self._joints.index(fault.joint)
+                states[:, joint] = self._broken(fault, states[:, joint])
+        seen.q, seen.qd = states
+
+    def _break_tracking(self, seen: Measurement) -> None:
+        pose = np.concatenate([seen.p_WO, seen.quat_WO])
+        for fault in self._pose_faults:
+            if fault.active(seen.t):
+                pose = self._broken(fault, pose)
+        seen.p_WO, seen.quat_WO = pose[:3], pose[3:]
+
+    def _broken(self, fault: Fault, values: Array) -> Array:
+        """What a sensor gives instead of these values: the first that it froze at, or NaN."""
+        if fault.kind in (FaultKind.ENCODER_DEAD, FaultKind.POSE_DEAD):
+            return np.full_like(values, np.nan)
+        return self._frozen.setdefault(fault, values.copy()).copy()
 
     def _noise(self, deviation: float, size: int) -> Array:
         return deviation * self._random.standard_normal(size)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, fields, replace
 
-from sim.checks import not_negative, positive, whole
+from sim.checks import length, not_negative, positive, whole
 from synthesis import InvalidInputError, Objective
 from synthesis.uncertainty_set import UncertaintySet
 
@@ -90,6 +90,45 @@ class Robustness:
 
 
 @dataclass(frozen=True)
+class Guard:
+    """When a run counts as in trouble (see :mod:`sim.guard`); an infinite threshold is none.
+
+    Attributes:
+        silence_s: How long the drives go on without a setpoint [s].
+        no_forces_s: How long the synthesis may find no forces [s].
+        blind_s: How long the object's pose may be missing [s].
+        tilt_error_deg: Tilt error, low-pass filtered [deg].
+        joint_error: Deviation of a joint from its path [rad or m], if it is also pulled hard.
+        joint_pull: Torque with which the impedance pulls it, as a share of its limit [-].
+        saturated_s: How long a torque may be cut at its limit while there is grip [s].
+        torque_error: Motor's torque against the commanded one, as a share of its limit [-].
+        contact_error: Distance of a hand's tip from its contact on the object as seen [m].
+        hold_s: How long a hold waits for a cause to pass [s].
+        holds_s: How long all holds of a run may take together [s].
+        lower_s: How long lowering may be blocked [s].
+    """
+
+    silence_s: float = 0.05
+    no_forces_s: float = 0.1
+    blind_s: float = 0.05
+    tilt_error_deg: float = 6.0
+    joint_error: float = 0.1
+    joint_pull: float = 0.3
+    saturated_s: float = 0.05
+    torque_error: float = 0.25
+    contact_error: float = 0.05
+    hold_s: float = 0.5
+    holds_s: float = 5.0
+    lower_s: float = 2.0
+
+    def __post_init__(self) -> None:
+        for field in fields(self):
+            value = getattr(self, field.name)
+            if not value > 0.0:
+                raise InvalidInputError(f"guard.{field.name}", value, "a number > 0")
+
+
+@dataclass(frozen=True)
 class Control:
     """How forces are synthesised and followed.
 
@@ -107,6 +146,7 @@ class Control:
         robustness: What the grip has to bear beyond the belief; None for the fixed margins of
             ``friction_factor`` and ``preload`` alone.
         pose_filter_s: Time constant with which the object's measured pose is smoothed [s].
+        guard: When the run is held, lowered or stopped.
     """
 
     friction_factor: float = 0.8
@@ -119,6 +159,7 @@ class Control:
     yielding_squeeze: bool = False
     robustness: Robustness | None = None
     pose_filter_s: float = 0.0
+    guard: Guard = Guard()
 
     def __post_init__(self) -> None:
         if not 0.0 < self.friction_factor <= 1.0:
@@ -180,7 +221,9 @@ class Physics:
         positive("physics.timestep", self.timestep)
         positive("physics.impratio", self.impratio)
         whole("physics.noslip_iterations", self.noslip_iterations, least=0)
+        length("physics.solimp", self.solimp, 3)
         for name in ("solref", "solref_friction"):
+            length(f"physics.{name}", getattr(self, name), 2)
             for value in getattr(self, name):
                 positive(f"physics.{name}", value)
         d0, dmax, width = self.solimp

@@ -19,6 +19,7 @@ class Trace:
     Attributes:
         t: (k,).
         phase: Index of the phase, (k,).
+        mode: Number of the :class:`sim.guard.Mode`, (k,).
         tilt_ref: Reference tilt [rad], (k,).
         tilt: Measured tilt [rad], (k,).
         p_WO, quat_WO, twist_WO: Object pose and twist (linear first), (k, 3 | 4 | 6).
@@ -36,6 +37,7 @@ class Trace:
 
     t: Array
     phase: Array
+    mode: Array
     tilt_ref: Array
     tilt: Array
     p_WO: Array
@@ -59,10 +61,9 @@ class Trace:
     @staticmethod
     def allocate(steps: int, joints: int, hands: int, contacts: int) -> Trace:
         """An all-zero trace, to be filled row by row."""
+        numbers = "t", "phase", "mode", "tilt_ref", "tilt", "synthesis_s", "failed", "collisions"
         shapes = {
-            **dict.fromkeys(
-                ("t", "phase", "tilt_ref", "tilt", "synthesis_s", "failed", "collisions"), ()
-            ),
+            **dict.fromkeys(numbers, ()),
             **dict.fromkeys(("q", "qd", "q_ref", "tau", "saturated"), (joints,)),
             "p_WO": (3,),
             "quat_WO": (4,),
@@ -75,6 +76,12 @@ class Trace:
             "w_command_C": (contacts, 6),
         }
         return Trace(**{name: np.zeros((steps, *shape)) for name, shape in shapes.items()})
+
+    def grown(self, steps: int) -> Trace:
+        """A copy with room for so many steps more, all-zero."""
+        arrays = {f.name: getattr(self, f.name) for f in fields(self)}
+        room = {n: np.zeros((steps, *array.shape[1:])) for n, array in arrays.items()}
+        return Trace(**{n: np.concatenate([array, room[n]]) for n, array in arrays.items()})
 
     def __len__(self) -> int:
         return len(self.t)

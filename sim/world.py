@@ -10,9 +10,10 @@ from dataclasses import dataclass, replace
 import mujoco
 import numpy as np
 
-from sim.checks import finite, not_negative, positive
+from sim.checks import finite, not_negative, positive, vector
 from sim.contacts import contact_axes
-from sim.scenario import Friction, Hand, Object, Rest, Scenario, Support, Vector
+from sim.faults import Fault
+from sim.scenario import Friction, Geom, Hand, Object, Rest, Scenario, Support, Vector
 from sim.scene import hand_body, tip_site
 from synthesis import InvalidInputError
 
@@ -36,8 +37,8 @@ class Push:
     def __post_init__(self) -> None:
         not_negative("push.t", self.t)
         positive("push.duration_s", self.duration_s)
-        finite("push.force_W", self.force_W)
-        finite("push.p_OA_O", self.p_OA_O)
+        vector("push.force_W", self.force_W, 3)
+        vector("push.p_OA_O", self.p_OA_O, 3)
 
 
 @dataclass(frozen=True)
@@ -66,6 +67,8 @@ class World:
         latency: Time from measurement to effect of the outer loop [s].
         dropped: Share of the outer loop's ticks whose results get lost [-].
         pushes: Forces on the object.
+        obstacles: What stands in the world besides the environment that is believed.
+        faults: What breaks during the run.
     """
 
     seed: int = 0
@@ -85,13 +88,15 @@ class World:
     latency: float = 0.0
     dropped: float = 0.0
     pushes: tuple[Push, ...] = ()
+    obstacles: tuple[Geom, ...] = ()
+    faults: tuple[Fault, ...] = ()
 
     def __post_init__(self) -> None:
         if self.seed < 0:
             raise InvalidInputError("world.seed", self.seed, "an integer >= 0")
         positive("world.mass", self.mass)
         positive("world.size", self.size)
-        finite("world.center_of_mass", self.center_of_mass)
+        vector("world.center_of_mass", self.center_of_mass, 3)
         for name in ("friction", "link_mass", "torque_gain"):
             for factor in getattr(self, name):
                 positive(f"world.{name}", factor)
@@ -99,7 +104,7 @@ class World:
             not_negative("world.joint_friction", friction)
         finite("world.torque_offset", self.torque_offset)
         for place in self.hand_place:
-            finite("world.hand_place", place)
+            vector("world.hand_place", place, 2)
         for name in ("torque_noise", "encoder_noise", "position_noise", "orientation_noise"):
             not_negative(f"world.{name}", getattr(self, name))
         not_negative("world.latency", self.latency)
@@ -125,6 +130,7 @@ class World:
         return replace(
             scenario,
             object=self._object(scenario.object),
+            environment=(*scenario.environment, *self.obstacles),
             hands=hands,
             supports=supports,
             rests=tuple(_rest(rest, supports) for rest in scenario.rests),
@@ -170,6 +176,10 @@ class World:
         joints = [int(model.actuator(i).trnid[0]) for i in range(model.nu)]
         for name in ("link_mass", "joint_friction", "torque_gain", "torque_offset"):
             _check_length(name, getattr(self, name), len(joints))
+        names = [model.joint(joint).name for joint in joints]
+        for fault in self.faults:
+            if fault.joint and fault.joint not in names:
+                raise InvalidInputError("fault.joint", fault.joint, f"one of {', '.join(names)}")
         for hand, place in zip(scenario.hands, self.hand_place, strict=False):
             pad, site = model.body(hand_body(hand)).id, model.site(tip_site(hand)).id
             offset = np.array([*place, 0.0])

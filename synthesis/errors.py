@@ -18,7 +18,13 @@ class InvalidInputError(FulcrumError, ValueError):
 
     def __init__(self, field: str, given: object, valid: str) -> None:
         self.field = field
-        super().__init__(f"{field}: got {given}; valid is {valid}.")
+        super().__init__(f"{field}: got {_on_one_line(given)}; valid is {valid}.")
+
+
+def _on_one_line(given: object) -> str:
+    if isinstance(given, str):
+        return given if given.isprintable() else repr(given)
+    return " ".join(str(given).split())
 
 
 class InfeasibleError(FulcrumError):

@@ -82,7 +82,7 @@ def test_two_frictions_between_the_same_geoms_are_refused():
 
 
 def test_a_hand_model_that_is_not_shipped_is_refused_by_name():
-    with pytest.raises(FileNotFoundError, match=r"'claw.xml'.*palm_pad.xml"):
+    with pytest.raises(InvalidInputError, match=r"'claw.xml'.*palm_pad.xml"):
         compose(with_hand(model="claw.xml"))
 
 

@@ -12,6 +12,7 @@ import rerun as rr
 from rerun.components import AggregationPolicy
 
 from sim.contacts import true_contacts
+from sim.guard import Mode
 from sim.monitor import ContactHistory
 from sim.recording.blueprint import TIMELINE, blueprint
 from sim.recording.columns import arrows, scalars, strips
@@ -78,7 +79,7 @@ class Recorder:
             sinks.append(rr.GrpcSink(viewer_url))
         layout = blueprint(scenario, np.asarray(scenario.path.point_W))
         self._recording.set_sinks(*sinks, default_blueprint=layout)
-        self._phase = -1.0
+        self._state = np.array([-1.0, -1.0])  # phase and mode of the last row
         self._scenery = Scenery(scenario, joints)
         self._scenery.log_shapes(self._recording)
         self._log_static(config, joints)
@@ -141,14 +142,19 @@ class Recorder:
         self._recording.send_columns(f"plots/{path}", [time], scalars(values))
 
     def _send_phases(self, block: Trace) -> None:
-        """Marks the rows at which a phase begins."""
-        before = np.concatenate([[self._phase], block.phase[:-1]])
-        begun = np.flatnonzero(block.phase != before)
-        self._phase = float(block.phase[-1])
+        """Marks the rows at which a phase begins, or what the run does in it changes."""
+        states = np.column_stack([block.phase, block.mode])
+        before = np.vstack([self._state, states[:-1]])
+        begun = np.flatnonzero((states != before).any(axis=1))
+        self._state = states[-1]
         if begun.size:
             time = rr.TimeColumn(TIMELINE, duration=block.t[begun])
-            names = [self._scenario.phases[int(index)].name for index in block.phase[begun]]
+            names = [self._state_name(int(phase), Mode(int(m))) for phase, m in states[begun]]
             self._recording.send_columns("phase", [time], rr.StateChange.columns(state=names))
+
+    def _state_name(self, phase: int, mode: Mode) -> str:
+        name = self._scenario.phases[phase].name
+        return name if mode is Mode.RUN else f"{mode.name}: {name}"
 
     def _send_scene(self, block: Trace, history: ContactHistory) -> None:
         first = -round(block.t[0] / self._scenario.physics.timestep) % self._stride
