@@ -112,14 +112,20 @@ def gripping(control, squeeze_n):
     return drives, J_n, q
 
 
-def torque_of(drives, q, deviation, share=1.0):
+def seen(q):
+    """A measurement of joints at rest."""
+    none = np.zeros(len(q))
+    return Measurement(0.0, q, none, np.zeros(3), np.array([1.0, 0.0, 0.0, 0.0]), none)
+
+
+def target(q):
+    return Target(0, 0.0, 1.0, q, np.zeros(len(q)))
+
+
+def torque_of(drives, q, deviation):
     """What the impedance adds for a deviation of the angles."""
-    target = Target(0, 0.0, share, q, np.zeros(len(q)))
-    torques = [
-        drives.torques(Measurement(0.0, q - d, np.zeros(len(q)), None, None), target, share)[0]
-        for d in (deviation, np.zeros(len(q)))
-    ]
-    return torques[0] - torques[1]
+    off, there = (drives.torques(seen(q - d), target(q), 1.0)[0] for d in (deviation, 0.0))
+    return off - there
 
 
 def normal_forces(tau, J_n):
@@ -132,11 +138,7 @@ def normal_forces(tau, J_n):
 def test_the_impedance_adds_no_squeeze_but_still_resists_a_shift_of_both_hands(yielding):
     control = replace(ROBUST, yielding_squeeze=yielding)
     drives, J_n, q = gripping(control, 40.0)
-    drives.torques(
-        Measurement(0.0, q, np.zeros(len(q)), None, None),
-        Target(0, 0.0, 1.0, q, np.zeros(len(q))),
-        1.0,
-    )
+    drives.torques(seen(q), target(q), 1.0)
     drives.update_model(q)
     push = np.linalg.pinv(J_n)
     # Both hands 0.1 mm off inwards, and both to the same side: their normals are opposed.
