@@ -51,6 +51,19 @@ class ScrewPath:
         p_WO = self._point + turn.apply(self._p_WO - self._point) + self._pitch * tilt * self.axis
         return (turn * self._R_WO).as_matrix(), p_WO + tilt / self.end * self._travel
 
+    def derivatives(self, tilt: float, p_O: Array) -> tuple[Array, Array]:
+        """First and second derivatives by tilt [m/rad, m/rad^2], (3,) each, of a point's place.
+
+        Args:
+            tilt: [rad].
+            p_O: The point in the object frame [m], (3,).
+        """
+        R_WO, p_WO = self.pose(tilt)
+        along = self._pitch * self.axis + self._travel / self.end
+        arm = p_WO + R_WO @ p_O - tilt * along - self._point
+        turning = np.cross(self.axis, arm)
+        return turning + along, np.cross(self.axis, turning)
+
     def tilt(self, quaternion: Array) -> Array:
         """Tilt [rad] of measured orientations, (..., 4) wxyz: their twist about the axis.
 
