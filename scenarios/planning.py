@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 import tyro
 
-from scenarios.common import PASSED, results_folder
+from scenarios.common import FAILED, PASSED, results_folder
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -64,21 +64,25 @@ class Plan:
     """New or empty folder for plan.json and plan.png; logs/SCENARIO-plan-TIME if left out."""
 
     def execute(self) -> int:
-        """Does it; returns the exit code."""
+        """Does it; returns the exit code: 1 if there is no such plan."""
         from rich.console import Console
 
         from scenarios import scenario
-        from scenarios.planning_figure import draw
         from sim.files import write_json
-        from sim.plan import plan
+        from sim.plan import PlanError, plan
         from sim.plan_file import plan_content
+        from sim.plan_picture import draw
 
         chosen = scenario(self.scenario)
         objective, duration = self._asked(chosen)
         out = results_folder(self.out, f"{self.scenario}-plan")
-        planned = plan(chosen, self._margins(chosen), objective, duration, self.points)
-        if self.stretch != 1.0:
-            planned = planned.stretched(self.stretch)
+        try:
+            planned = plan(chosen, self._margins(chosen), objective, duration, self.points)
+            if self.stretch != 1.0:
+                planned = planned.stretched(self.stretch)
+        except PlanError as error:
+            print(error)
+            return FAILED
         out.mkdir(parents=True, exist_ok=True)
         write_json(out / PLAN, plan_content(planned))
         draw(planned, out / PICTURE)

@@ -135,7 +135,7 @@ class Plan:
         Raises:
             PlanError: There are none, as where statics has none and only speed helps; says where.
         """
-        positive("factor", factor)
+        positive("stretch", factor)
         what = f"a tilt in {self.duration * factor:.3g} s"
         self._check_speeds(factor, what)
         timing = self.solution.b / factor**2

@@ -7,6 +7,7 @@ the utilisations of all contacts at all stations as its ratios.
 from __future__ import annotations
 
 import time
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
 import clarabel
@@ -88,7 +89,7 @@ def _solve(
     started = time.perf_counter()
     iterations = 0
     status = ""
-    for settings in (solver_settings(), *fallback_settings()):
+    for settings in _settings():
         result = clarabel.DefaultSolver(form.P, form.q, A, h, form.rows.cones, settings).solve()
         iterations += result.iterations
         status = str(result.status)
@@ -104,6 +105,15 @@ def _solve(
                 dual, gap = _optimality(form, A, h, x, z)
                 return _Found(form.completed(x), dual, gap, iterations, solve_s)
     raise SolverError(status)
+
+
+def _settings() -> Iterator[clarabel.DefaultSettings]:
+    """First without iterative refinement, in half the time: the solver stops by true residuals."""
+    quick = solver_settings()
+    quick.iterative_refinement_enable = False
+    yield quick
+    yield solver_settings()
+    yield from fallback_settings()
 
 
 def _optimality(form: PathForm, A: Array, h: Array, x: Array, z: Array) -> tuple[float, float]:

@@ -3,20 +3,16 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import matplotlib as mpl
 import numpy as np
 
+from sim.plan import Plan
 from synthesis.contact import Array, N
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-
-    from sim.plan import Plan
 
 mpl.use("Agg")
 from matplotlib import pyplot as plt
+from matplotlib.axes import Axes
 
 # As many joints as a legend can name: those that come nearest to their limits.
 _NAMED = 6
