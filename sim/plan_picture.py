@@ -33,7 +33,7 @@ def draw(plan: Plan, file: Path) -> None:
     _shares(axes[3], t, found.shares, "torque of ", "torque used [%]")
     _shares(axes[4], t, found.shares, "speed of ", "speed used [%]")
     for ax in axes[1:]:
-        ax.legend(fontsize=7, loc="center left", bbox_to_anchor=(1.0, 0.5))
+        ax.legend(fontsize=7, loc=(1.01, 0.0))
     for ax in axes:
         ax.grid(alpha=0.3)
     axes[-1].set_xlabel("time [s]")
