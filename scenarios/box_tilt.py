@@ -29,7 +29,8 @@ TABLE_LENGTH, TABLE_WIDTH, TABLE_THICKNESS = 0.5, 0.24, 0.04  # [m]
 
 MASS = WEIGHT / GRAVITY
 _SOLID = MASS / 12.0
-_POSTURE = {"s0": -0.26, "s1": 0.10, "e0": -0.53, "e1": 0.78, "w0": -0.80, "w1": 1.59, "w2": -0.83}
+# Elbows out to the side: of all postures at this place the one that is easiest on the shoulders.
+_POSTURE = {"s0": -0.06, "s1": 0.37, "e0": -1.17, "e1": 0.73, "w0": -0.07, "w1": 1.50, "w2": -1.03}
 _MIRRORED = ("s0", "e0", "w0", "w2")
 
 

@@ -58,8 +58,8 @@ class ContactFrames:
 
     def __init__(self, scenario: Scenario) -> None:
         hands, supports = scenario.hands, scenario.supports
-        self._R_OC = _stack([_axes(h.normal_O, h.tangent_O) for h in hands])
-        self._R_WP = _stack([_axes(s.normal_W, s.tangent_W) for s in supports])
+        self._R_OC = _stack([contact_axes(h.normal_O, h.tangent_O) for h in hands])
+        self._R_WP = _stack([contact_axes(s.normal_W, s.tangent_W) for s in supports])
         self.p_OC_O = np.array([h.p_OC_O for h in hands] + [s.p_OP_O for s in supports])
 
     def in_world(self, R_WO: Array) -> Array:
@@ -83,7 +83,8 @@ def rotations(quaternions: Array) -> Array:
     return flat.reshape(*quaternions.shape[:-1], 3, 3)
 
 
-def _axes(normal: Vector, tangent: Vector) -> Array:
+def contact_axes(normal: Vector, tangent: Vector) -> Array:
+    """Axes (t, o, n) of a contact as columns, (3, 3), in those of its normal and tangent."""
     n, t = np.asarray(normal, float), np.asarray(tangent, float)
     return np.column_stack([t, np.cross(n, t), n])
 

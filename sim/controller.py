@@ -1,28 +1,23 @@
-r"""Turns measured states into joint torques: synthesised feed-forward and joint impedance.
-
-.. math:: \tau = g(q) + s\,J^T f^* + D \dot q_d
-                 + M(q) \left( \omega^2 (q_d - q) + 2 \omega (\dot q_d - \dot q) \right)
-
-with :math:`f^*` the solution of (17) at the last synthesis, s the share of grip that the schedule
-asks for and D the joints' viscous friction. The mass matrix M gives every joint, light or heavy,
-the same bandwidth :math:`\omega`: damping that is explicit in time stays stable on light wrists.
-"""
+"""The outer loop: from the measured state to the forces that the drives are to make."""
 
 from __future__ import annotations
 
-import math
 import time
 from dataclasses import dataclass
 
-import numpy as np
-
+from sim.channel import Channel, Setpoint
+from sim.drives import Drives
+from sim.grip import GripSchedule
 from sim.ik import JointPath
+from sim.observer import PoseObserver
+from sim.path import ScrewPath
 from sim.plant import Measurement
 from sim.references import References
 from sim.robot import RobotModel
 from sim.scenario import Scenario
 from sim.settings import Control
 from sim.statics import Statics
+from sim.world import NO_DEVIATION
 from synthesis import (
     InfeasibleError,
     Problem,
@@ -62,7 +57,7 @@ class Command:
 
 
 class Controller:
-    """Quasi-static force control along the path; holds the last synthesised forces."""
+    """Quasi-static force control along the path; the drives hold the last synthesised forces."""
 
     def __init__(
         self,
@@ -70,73 +65,66 @@ class Controller:
         control: Control,
         robot: RobotModel,
         joint_path: JointPath,
+        channel: Channel | None = None,
+        grip: GripSchedule | None = None,
     ) -> None:
+        """Takes over what it believes.
+
+        Args:
+            scenario: The scene.
+            control: The settings.
+            robot: Its model.
+            joint_path: What the drives follow.
+            channel: The wire to the drives; an ideal one if left out.
+            grip: The least normal forces of the hands; the control's preload if left out.
+        """
         self._control = control
-        self._robot = robot
         self._references = References(joint_path, scenario.physics.timestep)
         self._free = joint_path.schedule.free
-        self._statics = Statics(scenario, control, robot)
+        self._statics = Statics(scenario, control, robot, grip)
         self._synthesizer = Synthesizer()
+        self._drives = Drives(robot, control.bandwidth, len(scenario.contact_names))
+        self._channel = channel or Channel(NO_DEVIATION)
+        self._observer = PoseObserver(ScrewPath(scenario.path), control.pose_filter_s)
         self._tick = 0
-        self._w_OC_C = np.zeros((len(scenario.contact_names), 6))
-        joints = len(robot.joints)
-        self._tau_g, self._tau_f = np.zeros(joints), np.zeros(joints)
-        self._share, self._tau_held, self._w_held = math.nan, self._tau_g, self._w_OC_C
-        # Deviations of angles and speeds, and torques per each of them: both terms in one product.
-        self._deviation, self._gains = np.zeros((2, joints)), np.zeros((joints, 2, joints))
 
     def command(self, measurement: Measurement) -> Command:
         """The torques for the next step."""
-        phase, tilt, grip, q_ref, qd_ref = self._references.at(measurement.t)
+        target = self._references.at(measurement.t)
         synthesis_s, failed = 0.0, False
         if self._tick % self._control.solve_every == 0:
-            self._update_model(measurement)
-            self._share = math.nan  # what was held is to be found anew
-            if not self._free[phase]:
+            self._drives.update_model(measurement.q)
+            if not self._free[target.phase]:
                 started = time.perf_counter()
-                failed = not self._synthesize(measurement)
+                failed = not self._synthesize(measurement, target.tilt)
                 synthesis_s = time.perf_counter() - started
         self._tick += 1
-        share = grip if self._control.feedforward else 0.0
-        np.subtract(q_ref, measurement.q, self._deviation[0])
-        np.subtract(qd_ref, measurement.qd, self._deviation[1])
-        tau = self._gains.reshape(len(q_ref), -1).dot(self._deviation.reshape(-1))
-        tau += self._robot.damping * qd_ref
-        tau += self._held(share)
-        limited = np.minimum(np.maximum(tau, self._robot.tau_min), self._robot.tau_max)
+        setpoint = self._channel.receive(measurement.t)
+        if setpoint is not None:
+            self._drives.follow(setpoint)
+        share = target.grip if self._control.feedforward else 0.0
+        tau, saturated = self._drives.torques(measurement, target, share)
         return Command(
-            tau=limited,
-            saturated=limited != tau,
-            q_ref=q_ref,
-            phase=phase,
-            tilt_ref=tilt,
-            w_OC_C=self._w_held,
+            tau=tau,
+            saturated=saturated,
+            q_ref=target.q,
+            phase=target.phase,
+            tilt_ref=target.tilt,
+            w_OC_C=self._drives.w_held,
             synthesis_s=synthesis_s,
             failed=failed,
         )
 
-    def _held(self, share: float) -> Array:
-        """Torques that hold robot and object, as until the next synthesis or change of share."""
-        if share != self._share:
-            self._share = share
-            self._tau_held = self._tau_g + share * self._tau_f
-            self._w_held = share * self._w_OC_C
-        return self._tau_held
-
-    def _update_model(self, measurement: Measurement) -> None:
-        self._robot.update(measurement.q)
-        omega, mass_matrix = self._control.bandwidth, self._robot.mass_matrix()
-        self._gains[:, 0], self._gains[:, 1] = omega**2 * mass_matrix, 2.0 * omega * mass_matrix
-        self._tau_g = self._robot.gravity()
-
-    def _synthesize(self, measurement: Measurement) -> bool:
-        """Takes over the forces of a solution, if there is one; returns whether there was."""
-        problem = self._statics.problem(measurement.p_WO, measurement.quat_WO)
+    def _synthesize(self, measurement: Measurement, tilt_ref: float) -> bool:
+        """Sends the forces of a solution, if there is one; returns whether there was."""
+        m = measurement
+        pose = self._observer.update(m.t, m.p_WO, m.quat_WO, tilt_ref)
+        problem = self._statics.problem(*pose)
         forces = self._solve(problem)
         if forces is None:
             return False
-        self._w_OC_C = forces.w_OC_C
-        self._tau_f = forces.tau - self._tau_g
+        setpoint = Setpoint(forces.tau - self._drives.tau_g, forces.w_OC_C)
+        self._channel.send(measurement.t, setpoint)
         return isinstance(forces, Solution)
 
     def _solve(self, problem: Problem) -> Solution | BestEffort | None:

@@ -7,15 +7,20 @@ from collections.abc import Iterator
 import numpy as np
 from dm_control.rl.control import PhysicsError
 
+from sim.channel import Channel
 from sim.contacts import ContactFrames
 from sim.controller import Controller
+from sim.grip import GripSchedule
 from sim.ik import JointPath, plan_joints
 from sim.path import ScrewPath
 from sim.plant import Measurement, Plant
 from sim.robot import RobotModel
+from sim.robust import plan_grip
 from sim.scenario import Scenario
+from sim.sensors import Sensors
 from sim.settings import Control
 from sim.trace import Trace
+from sim.world import NO_DEVIATION, World
 from synthesis import FulcrumError
 
 # Time per block that is handed on while the loop runs [s]; what an abrupt end may lose.
@@ -33,6 +38,7 @@ class ClosedLoop:
     """One run of a scenario.
 
     Attributes:
+        truth: What the plant is.
         robot: The controller's belief about the robot.
         trace: The whole run; filled up to ``steps`` rows.
         steps: How many steps have been made.
@@ -46,27 +52,37 @@ class ClosedLoop:
         truth: Scenario | None = None,
         seed: int = 0,
         joint_path: JointPath | None = None,
+        world: World = NO_DEVIATION,
+        grip: GripSchedule | None = None,
     ) -> None:
         """Plans the joint path, if need be, and sets up plant and controller.
 
         Args:
             scenario: What the controller believes.
             control: The controller.
-            truth: What the plant is; the scenario if left out.
+            truth: What the plant is but for the world; the scenario if left out.
             seed: Draws the deviations of the start posture.
             joint_path: The scenario's, where it is planned already.
+            world: How the plant deviates from that, and what disturbs it; nothing by default.
+            grip: That of a control with an uncertainty set, where it is planned already.
 
         Raises:
+            InvalidInputError: The world does not fit the scenario.
             PathError: The arms cannot follow the path.
+            RobustInfeasibleError: No grip holds even the nominal object somewhere on the path.
         """
         self._path = ScrewPath(scenario.path)
         self.robot = robot = RobotModel(scenario)
         joint_path = joint_path or plan_joints(scenario)
-        self._controller = Controller(scenario, control, robot, joint_path)
-        self._plant = Plant(truth or scenario)
+        self.truth = world.truth(truth or scenario)
+        if grip is None and control.uncertainty is not None:
+            grip = plan_grip(scenario, control, joint_path)
+        self._controller = Controller(scenario, control, robot, joint_path, Channel(world), grip)
+        self._sensors = Sensors(world)
+        self._plant = Plant(self.truth, world)
         deviation = np.random.default_rng(seed).normal(size=len(robot.joints))
         self._plant.reset(joint_path.start + scenario.robot.start_deviation * deviation)
-        dt = (truth or scenario).physics.timestep
+        dt = self.truth.physics.timestep
         self.steps = 0
         self.total_steps = round(joint_path.schedule.total_s / dt)
         self._block = max(1, round(_BLOCK_S / dt))
@@ -120,7 +136,7 @@ class ClosedLoop:
         trace, plant = self.trace, self._plant
         measurement = plant.measure()
         self._write_state(row, measurement)
-        command = self._controller.command(measurement)
+        command = self._controller.command(self._sensors.see(measurement))
         plant.apply(command.tau)
         plant.step()
         trace.phase[row] = command.phase

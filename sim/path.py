@@ -20,6 +20,12 @@ class ScrewPath:
 
     S is the screw with the path's axis, point and pitch; the tilt :math:`\theta` is its angle. A
     travel, which lifts the object off while it turns, is added in proportion to the tilt.
+
+    Attributes:
+        axis: Direction of the axis in the world, (3,), of length 1.
+        point: A point on it [m], (3,).
+        advance: Translation that goes with the turn [m/rad], (3,).
+        end: Tilt at the end [rad].
     """
 
     def __init__(self, pivot: Pivot) -> None:
@@ -39,17 +45,17 @@ class ScrewPath:
             raise InvalidInputError("path.angle_deg", pivot.angle_deg, "in (0, 180) deg")
         self.axis = np.asarray(pivot.axis_W, float) / length
         self.end = float(np.radians(pivot.angle_deg))
-        self._point = np.asarray(pivot.point_W, float)
-        self._pitch = pivot.pitch
-        self._travel = np.asarray(pivot.travel, float)
+        self.point = np.asarray(pivot.point_W, float)
+        # Translation per radian on top of the turn [m].
+        self.advance = pivot.pitch * self.axis + np.asarray(pivot.travel, float) / self.end
         self._R_WO = rotation(pivot.start)
         self._p_WO = np.asarray(pivot.start.position, float)
 
     def pose(self, tilt: float) -> tuple[Array, Array]:
         """Orientation, (3, 3), and position [m], (3,), of the object at a tilt [rad]."""
         turn = Rotation.from_rotvec(tilt * self.axis)
-        p_WO = self._point + turn.apply(self._p_WO - self._point) + self._pitch * tilt * self.axis
-        return (turn * self._R_WO).as_matrix(), p_WO + tilt / self.end * self._travel
+        p_WO = self.point + turn.apply(self._p_WO - self.point) + tilt * self.advance
+        return (turn * self._R_WO).as_matrix(), p_WO
 
     def derivatives(self, tilt: float, p_O: Array) -> tuple[Array, Array]:
         """First and second derivatives by tilt [m/rad, m/rad^2], (3,) each, of a point's place.

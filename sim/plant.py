@@ -13,6 +13,7 @@ from sim.motion_log import MotionLog
 from sim.scenario import Scenario
 from sim.scene import compose
 from sim.trace import Trace
+from sim.world import NO_DEVIATION, World
 from synthesis.contact import Array
 
 with warnings.catch_warnings():  # dm_control looks for a display on import; none is needed
@@ -40,6 +41,24 @@ class Measurement:
     quat_WO: Array
 
 
+class Motors:
+    """What the motors make of the torques they are asked for."""
+
+    def __init__(self, world: World, limits: Array) -> None:
+        self._gain = np.array(world.torque_gain) if world.torque_gain else 1.0
+        self._offset = np.array(world.torque_offset) if world.torque_offset else 0.0
+        self._noise = world.torque_noise * limits
+        self._noisy = world.torque_noise > 0.0
+        self._random = np.random.default_rng([world.seed, 3])
+
+    def torques(self, tau: Array) -> Array:
+        """Torques at the joints [N·m or N], (l,), before the motors saturate."""
+        made = self._gain * tau + self._offset
+        if self._noisy:
+            made += self._noise * self._random.standard_normal(len(tau))
+        return made
+
+
 class Plant:
     """Steps the scene and reads it by the scenario's names; the only module that steps MuJoCo.
 
@@ -52,11 +71,21 @@ class Plant:
         joints: Names of the driven joints, in the order of the motors.
     """
 
-    def __init__(self, scenario: Scenario) -> None:
+    def __init__(self, scenario: Scenario, world: World = NO_DEVIATION) -> None:
+        """Builds the scene.
+
+        Args:
+            scenario: What the plant truly is.
+            world: What its robot truly is, and what disturbs it; nothing by default.
+
+        Raises:
+            InvalidInputError: Scenario or world contradict themselves or each other.
+        """
         self.physics = dm_mujoco.Physics.from_model(wrapper.MjModel(compose(scenario).compile()))
         self.physics.legacy_step = False  # else new contacts would be read with old forces
         self._model, self._data = self.physics.model.ptr, self.physics.data.ptr
         model = self._model
+        world.change(scenario, model)
         joints = [int(model.actuator(i).trnid[0]) for i in range(model.nu)]
         self.joints = tuple(model.joint(j).name for j in joints)
         self._q = model.jnt_qposadr[joints].copy()
@@ -67,6 +96,8 @@ class Plant:
         self._object = thing.id
         self._contacts, self._reader = ContactLog(), ContactReader(scenario, model)
         self._motion = MotionLog(scenario, model)
+        self._motors = Motors(world, model.actuator_ctrlrange[:, 1])
+        self._pushes = world.pushes
 
     @property
     def collisions(self) -> dict[tuple[str, str], float]:
@@ -84,8 +115,8 @@ class Plant:
         self._data.qpos[self._q] = q
 
     def apply(self, tau: Array) -> None:
-        """Sets the motor torques [N·m or N], (l,), for the next step; the motors saturate."""
-        self._data.ctrl[:] = tau
+        """Commands the motor torques [N·m or N], (l,), for the next step; the motors saturate."""
+        self._data.ctrl[:] = self._motors.torques(tau)
 
     def step(self) -> None:
         """One physics step.
@@ -93,7 +124,21 @@ class Plant:
         Raises:
             dm_control.rl.control.PhysicsError: The state has diverged.
         """
+        if self._pushes:
+            self._push()
         self.physics.step()
+
+    def _push(self) -> None:
+        """Applies the pushes of this instant at their points on the object."""
+        data, body = self._data, self._object
+        wrench = data.xfrc_applied[body]
+        wrench[:] = 0.0
+        for push in self._pushes:
+            if push.t <= data.time < push.t + push.duration_s:
+                R_WO = data.xmat[body].reshape(3, 3)
+                arm = data.xpos[body] + R_WO @ push.p_OA_O - data.xipos[body]
+                wrench[:3] += push.force_W
+                wrench[3:] += np.cross(arm, push.force_W)
 
     def measure(self) -> Measurement:
         """The present state."""

@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from sim.ik import plan_joints
+from sim.grip import GripSchedule
+from sim.ik import JointPath, plan_joints
 from sim.path import ScrewPath
 from sim.robot import RobotModel
 from sim.scenario import GRAVITY, Scenario
@@ -25,13 +26,22 @@ class PathProblems:
         joint_path: How the arms follow it; None without joints.
     """
 
-    def __init__(self, scenario: Scenario, control: Control, with_joints: bool = True) -> None:
-        """Plans the joint path.
+    def __init__(
+        self,
+        scenario: Scenario,
+        control: Control,
+        with_joints: bool = True,
+        joint_path: JointPath | None = None,
+        grip: GripSchedule | None = None,
+    ) -> None:
+        """Plans the joint path, if need be.
 
         Args:
             scenario: The scene.
             control: What the synthesis is told: friction factor, preload, objective.
             with_joints: Whether the arms are part of the problem: (15) and (16).
+            joint_path: The scenario's, where it is planned already.
+            grip: The least normal forces of the hands; the control's preload if left out.
 
         Raises:
             PathError: The arms cannot follow the path.
@@ -40,8 +50,8 @@ class PathProblems:
         self._path = ScrewPath(scenario.path)
         self.end_deg = float(np.degrees(self._path.end))
         self._robot = RobotModel(scenario) if with_joints else None
-        self.joint_path = plan_joints(scenario) if with_joints else None
-        self._statics = Statics(scenario, control, self._robot)
+        self.joint_path = joint_path or plan_joints(scenario) if with_joints else None
+        self._statics = Statics(scenario, control, self._robot, grip)
 
     def tilts(self, step_deg: float) -> Array:
         """Evenly spaced tilts from start to end, at most a step apart [deg]."""
@@ -57,7 +67,8 @@ class PathProblems:
         if self._robot is not None and self.joint_path is not None:
             self._robot.update(self.joint_path.holding(tilt))
         R_WO, p_WO = self._path.pose(tilt)
-        return self._statics.problem(p_WO, Rotation.from_matrix(R_WO).as_quat(scalar_first=True))
+        quat_WO = Rotation.from_matrix(R_WO).as_quat(scalar_first=True)
+        return self._statics.problem(p_WO, quat_WO, tilt)
 
     def gravity(self, tilt_deg: float) -> Gravity:
         """The object's weight at a tilt [deg]."""

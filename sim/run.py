@@ -24,6 +24,7 @@ from sim.report import Report, RunInfo
 from sim.scenario import Scenario
 from sim.settings import Control
 from sim.trace import Trace
+from sim.world import NO_DEVIATION, World
 from synthesis import (
     FulcrumError,
     InfeasibleError,
@@ -53,6 +54,7 @@ class Request:
         out: Folder for recording, configuration and report; None writes nothing.
         live: Whether to open a viewer that follows the run (with ``out`` only).
         anyway: Whether to run although the synthesis finds no forces somewhere on the path.
+        world: What is true of the plant beyond the scenario; nothing else by default.
     """
 
     scenario: Scenario
@@ -62,6 +64,7 @@ class Request:
     out: Path | None = None
     live: bool = False
     anyway: bool = False
+    world: World = NO_DEVIATION
 
 
 class UnholdableError(FulcrumError):
@@ -104,10 +107,16 @@ def execute(request: Request, progress: Progress | None = None) -> Result:
     joint_path = None
     if request.control.feedforward and not request.anyway:
         joint_path = _feasible_path(scenario, request.control)
-    loop = ClosedLoop(scenario, request.control, seed=request.seed, joint_path=joint_path)
-    monitor = Monitor(scenario)
+    loop = ClosedLoop(
+        scenario,
+        request.control,
+        seed=request.seed,
+        joint_path=joint_path,
+        world=request.world,
+    )
+    monitor = Monitor(loop.truth)
     robot = loop.robot
-    judge = Judge(scenario, robot.joints, robot.tau_min, robot.tau_max)
+    judge = Judge(loop.truth, robot.joints, robot.tau_min, robot.tau_max)
     recorder = None
     histories: list[ContactHistory] = []
     error: str | None = None
@@ -119,7 +128,7 @@ def execute(request: Request, progress: Progress | None = None) -> Result:
             write_json(out / CONFIG, config)
             limits = robot.tau_min, robot.tau_max
             recorder = Recorder(
-                out / RECORDING, scenario, config, robot.joints, *limits, viewer_url=viewer_url
+                out / RECORDING, loop.truth, config, robot.joints, *limits, viewer_url=viewer_url
             )
         started = time.perf_counter()
         try:
@@ -197,6 +206,7 @@ def resolved_config(request: Request) -> dict[str, Any]:
             "seed": request.seed,
             "control": dataclasses.asdict(request.control),
             "scenario": dataclasses.asdict(request.scenario),
+            "world": dataclasses.asdict(request.world),
             "versions": {name: version(name) for name in _PACKAGES},
         }
     )

@@ -7,6 +7,7 @@ from dataclasses import dataclass, fields, replace
 
 from sim.checks import not_negative, positive, whole
 from synthesis import InvalidInputError, Objective
+from synthesis.uncertainty_set import UncertaintySet
 
 # A trace takes about 2 kB per step: a gigabyte in this time [s].
 _LONGEST_S = 600.0
@@ -85,6 +86,7 @@ class Control:
             applied, instead of the last that did.
         solve_every: Physics steps per synthesis.
         bandwidth: Natural frequency of the joint impedance, which is critically damped [rad/s].
+        pose_filter_s: Time constant with which the object's measured pose is smoothed [s].
     """
 
     friction_factor: float = 0.8
@@ -94,22 +96,34 @@ class Control:
     best_effort: bool = False
     solve_every: int = 4
     bandwidth: float = 30.0
+    pose_filter_s: float = 0.0
 
     def __post_init__(self) -> None:
         if not 0.0 < self.friction_factor <= 1.0:
             raise InvalidInputError("control.friction_factor", self.friction_factor, "in (0, 1]")
-        for name in ("preload", "bandwidth"):
+        for name in ("preload", "bandwidth", "pose_filter_s"):
             not_negative(f"control.{name}", getattr(self, name))
         whole("control.solve_every", self.solve_every, least=1)
+
+
+# What the robust controller's grip bears.
+_BORNE = UncertaintySet(mass=0.25, center=(0.025,) * 3, friction=0.25, placement=0.005)
 
 
 def controllers(control: Control) -> dict[str, Control]:
     """The controllers by name, made from a scenario's own control.
 
-    ``margin`` is that control; ``paper`` is (17) as printed, with the full friction and no preload;
+    ``robust`` grips for every world of an uncertainty set and is stiffer, ``margin`` is that control; ``paper`` is (17) as printed, with the full friction and no preload;
     ``no-feedforward`` applies joint impedance and gravity compensation alone.
     """
     return {
+        "robust": replace(
+            control,
+            preload=max(control.preload, 25.0),
+            uncertainty=_BORNE,
+            bandwidth=100.0,
+            pose_filter_s=0.05,
+        ),
         "margin": control,
         "paper": replace(control, friction_factor=1.0, preload=0.0),
         "no-feedforward": replace(control, feedforward=False),

@@ -5,6 +5,7 @@ from synthesis.errors import (
     FulcrumError,
     InfeasibleError,
     InvalidInputError,
+    RobustInfeasibleError,
     SolverError,
     UnboundedError,
 )
@@ -24,6 +25,7 @@ __all__ = [
     "Objective",
     "Problem",
     "Residuals",
+    "RobustInfeasibleError",
     "Role",
     "Solution",
     "SolverError",

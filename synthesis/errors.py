@@ -6,6 +6,7 @@ import math
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
+    from synthesis.robust_certificate import RobustCertificate
     from synthesis.solution import Certificate
 
 
@@ -28,6 +29,17 @@ class InfeasibleError(FulcrumError):
         self.certificate = certificate
         super().__init__(
             "no contact forces keep the object in equilibrium within all limits; "
+            f"most binding: {', '.join(certificate.heaviest(3))}."
+        )
+
+
+class RobustInfeasibleError(FulcrumError):
+    """No normal forces of the hands serve all worlds; carries the Farkas certificate."""
+
+    def __init__(self, certificate: RobustCertificate) -> None:
+        self.certificate = certificate
+        super().__init__(
+            f"no normal forces of the hands serve all {len(certificate.problems)} worlds; "
             f"most binding: {', '.join(certificate.heaviest(3))}."
         )
 

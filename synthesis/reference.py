@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import contextlib
 import warnings
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import cvxpy as cp
@@ -61,6 +62,23 @@ def solve_reference(problem: Problem) -> ReferenceSolution:
     return _Formulation(problem).solve()
 
 
+def solve_robust_reference(problems: Sequence[Problem]) -> float:
+    """The objective of the robust counterpart of (17): one grip for all worlds [N].
+
+    Raises:
+        ReferenceInfeasibleError: No normal forces of the hands serve all worlds.
+        SolverError: The solver gave neither.
+    """
+    worlds = [_Formulation(problem) for problem in problems]
+    first = worlds[0]
+    constraints = [constraint for world in worlds for constraint in world.constraints()]
+    for world in worlds[1:]:
+        constraints += [
+            a == b for a, b in zip(first.hand_normals(), world.hand_normals(), strict=True)
+        ]
+    return first.run(cp.Problem(cp.Minimize(first.objective()), constraints))
+
+
 class _Formulation:
     """The variables of (17) and its constraints, one method per equation of the paper."""
 
@@ -75,12 +93,16 @@ class _Formulation:
         if self.problem.objective is Objective.FRICTION_MARGIN:
             value = self._bisected_margin()
         else:
-            constraints = [self._imbalance() == 0, *self._limits(), *self._friction_cones()]
-            value = self._run(cp.Problem(cp.Minimize(self._objective()), constraints))
+            value = self.run(cp.Problem(cp.Minimize(self.objective()), self.constraints()))
         tau = np.zeros(0) if self.tau is None else self.tau.value
         return ReferenceSolution(value, self._wrenches(), tau, self.scalars)
 
-    def _run(self, program: cp.Problem) -> float:
+    def constraints(self) -> list[cp.Constraint]:
+        """All of (17)."""
+        return [self._imbalance() == 0, *self._limits(), *self._friction_cones()]
+
+    def run(self, program: cp.Problem) -> float:
+        """The optimal value of a program in these variables."""
         for tolerance in _TOLERANCES:
             tolerances = {f"tol_{name}": tolerance for name in ("feas", "gap_abs", "gap_rel")}
             with warnings.catch_warnings(), contextlib.suppress(cp.SolverError):
@@ -160,9 +182,9 @@ class _Formulation:
             constraints.append(cp.norm2(tangential) / contact.mu <= s * w[2] + excess)
         return constraints
 
-    def _objective(self) -> cp.Expression:
-        normals = self._normals()
-        f_n = cp.hstack([normals[i] for i in self._hands()])
+    def objective(self) -> cp.Expression:
+        """Phi of (17)."""
+        f_n = cp.hstack(self.hand_normals())
         match self.problem.objective:
             case Objective.MAX_NORMAL_FORCE:
                 return cp.max(f_n)
@@ -187,16 +209,21 @@ class _Formulation:
         excess, s = cp.Variable(), cp.Parameter(nonneg=True, value=1.0)
         constraints = [self._imbalance() == 0, excess >= -size, *self._limits()]
         phase_1 = cp.Problem(cp.Minimize(excess), [*constraints, *self._friction_cones(s, excess)])
-        if self._run(phase_1) > _EXCESS * size:
+        if self.run(phase_1) > _EXCESS * size:
             raise ReferenceInfeasibleError("the reference finds no forces within the cones")
         low, high = 0.0, 1.0
         while high - low > _MARGIN_TOLERANCE:
             s.value = (low + high) / 2
-            if self._run(phase_1) > 0.0:
+            if self.run(phase_1) > 0.0:
                 low = s.value
             else:
                 high = s.value
         return high
+
+    def hand_normals(self) -> list[cp.Expression]:
+        """Normal forces of the hands [N]."""
+        normals = self._normals()
+        return [normals[i] for i in self._hands()]
 
     def _hands(self) -> list[int]:
         return [i for i, c in enumerate(self.problem.contacts) if c.role is Role.HAND]

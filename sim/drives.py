@@ -1,0 +1,80 @@
+r"""The drives: joint impedance at the physics' rate along the path, and the forces last asked for.
+
+.. math:: \tau = g(q) + s\,J^T f^* + D \dot q_d
+                 + M(q) \left( \omega^2 (q_d - q) + 2 \omega (\dot q_d - \dot q) \right)
+
+with :math:`f^*` the forces of the last setpoint that has arrived, s the share of grip that the
+schedule asks for and D the joints' viscous friction. The mass matrix M gives every joint, light or
+heavy, the same bandwidth :math:`\omega`: damping that is explicit in time stays stable on light
+wrists.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from sim.channel import Setpoint
+from sim.plant import Measurement
+from sim.references import Target
+from sim.robot import RobotModel
+from synthesis.contact import Array
+
+
+class Drives:
+    """Turns measured joint states into torques within the limits.
+
+    Attributes:
+        tau_g: Torques that hold the robot up, as of the last update of the model (l,).
+        w_held: Wrenches on the object that the last torques were to make [N, N·m], (m, 6).
+    """
+
+    def __init__(self, robot: RobotModel, bandwidth: float, contacts: int) -> None:
+        """Takes over the model of the robot, which whoever updates it shares [rad/s]."""
+        self._robot, self._bandwidth = robot, bandwidth
+        joints = len(robot.joints)
+        self.tau_g = np.zeros(joints)
+        self._setpoint = Setpoint(np.zeros(joints), np.zeros((contacts, 6)))
+        self._share, self._tau_held, self.w_held = math.nan, self.tau_g, self._setpoint.w_OC_C
+        # Deviations of angles and speeds, and torques per each of them: both terms in one product.
+        self._deviation, self._gains = np.zeros((2, joints)), np.zeros((joints, 2, joints))
+
+    def update_model(self, q: Array) -> None:
+        """Takes over joint angles [rad or m], (l,), for gravity and gains until the next update."""
+        self._robot.update(q)
+        omega, mass_matrix = self._bandwidth, self._robot.mass_matrix()
+        self._gains[:, 0], self._gains[:, 1] = omega**2 * mass_matrix, 2.0 * omega * mass_matrix
+        self.tau_g = self._robot.gravity()
+        self._share = math.nan  # what was held is to be found anew
+
+    def follow(self, setpoint: Setpoint) -> None:
+        """Takes over a setpoint that has arrived."""
+        self._setpoint = setpoint
+        self._share = math.nan
+
+    def torques(
+        self, measurement: Measurement, target: Target, share: float
+    ) -> tuple[Array, Array]:
+        """Torques [N·m or N], (l,), and which of them were cut at their limit.
+
+        Args:
+            measurement: The present state of the joints.
+            target: Where they should be.
+            share: Of the setpoint's forces that is applied [-].
+        """
+        np.subtract(target.q, measurement.q, self._deviation[0])
+        np.subtract(target.qd, measurement.qd, self._deviation[1])
+        tau = self._gains.reshape(len(target.q), -1).dot(self._deviation.reshape(-1))
+        tau += self._robot.damping * target.qd
+        tau += self._held(share)
+        limited = np.minimum(np.maximum(tau, self._robot.tau_min), self._robot.tau_max)
+        return limited, limited != tau
+
+    def _held(self, share: float) -> Array:
+        """Torques that hold robot and object, as until the next setpoint or change of share."""
+        if share != self._share:
+            self._share = share
+            self._tau_held = self.tau_g + share * self._setpoint.tau_f
+            self.w_held = share * self._setpoint.w_OC_C
+        return self._tau_held
