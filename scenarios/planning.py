@@ -57,6 +57,15 @@ class Plan:
     tip_acceleration: float = math.inf
     """Largest acceleration of the hands' contacts [m/s^2]."""
 
+    mass: float = 0.0
+    """Share by which the mass may be lower or higher: timing and grip serve all of these sets."""
+
+    center: float = 0.0
+    """Offset of the centre of mass along each of the object's axes, either way [m]."""
+
+    friction: float = 0.0
+    """Share by which friction may be lower, on top of the friction factor."""
+
     stretch: float = 1.0
     """Then stretches the duration by this factor, with forces for the largest friction margin."""
 
@@ -72,12 +81,15 @@ class Plan:
         from sim.plan import PlanError, plan
         from sim.plan_file import plan_content
         from sim.plan_picture import draw
+        from synthesis.uncertainty_set import UncertaintySet
 
         chosen = scenario(self.scenario)
         objective, duration = self._asked(chosen)
+        margins = self._margins(chosen)
+        uncertainty = UncertaintySet(self.mass, (self.center,) * 3, self.friction)
         out = results_folder(self.out, f"{self.scenario}-plan")
         try:
-            planned = plan(chosen, self._margins(chosen), objective, duration, self.points)
+            planned = plan(chosen, margins, objective, duration, self.points, uncertainty)
             if self.stretch != 1.0:
                 planned = planned.stretched(self.stretch)
         except PlanError as error:

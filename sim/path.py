@@ -65,10 +65,9 @@ class ScrewPath:
             p_O: The point in the object frame [m], (3,).
         """
         R_WO, p_WO = self.pose(tilt)
-        along = self._pitch * self.axis + self._travel / self.end
-        arm = p_WO + R_WO @ p_O - tilt * along - self._point
+        arm = p_WO + R_WO @ p_O - tilt * self.advance - self.point
         turning = np.cross(self.axis, arm)
-        return turning + along, np.cross(self.axis, turning)
+        return turning + self.advance, np.cross(self.axis, turning)
 
     def tilt(self, quaternion: Array) -> Array:
         """Tilt [rad] of measured orientations, (..., 4) wxyz: their twist about the axis.

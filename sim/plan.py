@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import NamedTuple
@@ -12,7 +11,7 @@ import numpy as np
 from scipy.interpolate import BSpline
 
 from sim.checks import positive
-from sim.plan_problem import Margins, path_problem
+from sim.plan_problem import CERTAIN, Margins, path_problem
 from sim.scenario import Scenario
 from synthesis import FulcrumError, InvalidInputError
 from synthesis.contact import Array
@@ -20,6 +19,7 @@ from synthesis.errors import InfeasiblePathError
 from synthesis.path_problem import PathObjective, PathProblem
 from synthesis.path_solution import PathSolution
 from synthesis.path_synthesizer import solve_path
+from synthesis.uncertainty_set import UncertaintySet
 
 # What the solver's accuracy may add to a limit that a plan uses up, as a share of it [-].
 _EXCESS = 1e-6
@@ -147,11 +147,16 @@ class Plan:
     def _check_speeds(self, factor: float, what: str) -> None:
         """Refuses what breaks limits of speed or acceleration, which no forces could change."""
         places = self.tilt[self.solution.problem.stations[:, 0]]
+        broken: dict[str, tuple[float, float]] = {}
         for kind, power in (("speed", 1), ("acceleration", 2)):
             for name, used in self.solution.shares.items():
-                worst = int(used.argmax())
-                if name.startswith(f"{kind} of ") and used[worst] > (1.0 + _EXCESS) * factor**power:
-                    raise PlanError(self.scenario.name, what, [(name, np.degrees(places[worst]))])
+                k = int(used.argmax())
+                excess = used[k] / factor**power - 1.0
+                if name.startswith(f"{kind} of ") and excess > _EXCESS:
+                    broken[name] = float(excess), float(np.degrees(places[k]))
+        if broken:
+            worst = max(broken, key=lambda name: broken[name][0])
+            raise PlanError(self.scenario.name, what, [(worst, broken[worst][1])])
 
 
 def plan(
@@ -160,7 +165,7 @@ def plan(
     objective: PathObjective = PathObjective.LEAST_TIME,
     duration: float = math.inf,
     points: int = 100,
-    worlds: Sequence[Scenario] = (),
+    uncertainty: UncertaintySet = CERTAIN,
 ) -> Plan:
     """Plans the tilt of a scenario.
 
@@ -170,7 +175,7 @@ def plan(
         objective: What is minimised.
         duration: The longest that the tilt may take [s].
         points: Grid points, at least 3.
-        worlds: See :func:`sim.plan_problem.path_problem`.
+        uncertainty: What the plan is to serve with one timing and one grip.
 
     Raises:
         InvalidInputError: An argument is senseless.
@@ -179,7 +184,7 @@ def plan(
     """
     if points < 3:
         raise InvalidInputError("points", points, "an integer >= 3")
-    problem, curve, joints = path_problem(scenario, margins, points, worlds)
+    problem, curve, joints = path_problem(scenario, margins, points, uncertainty)
     problem = replace(problem, objective=objective, duration=duration)
     what = "every tilt" if math.isinf(duration) else f"every tilt in at most {duration:g} s"
     return Plan(scenario, margins, joints, _solve(scenario, problem, what), curve)

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
+import itertools
 import math
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -14,16 +14,20 @@ from sim.checks import not_negative, positive
 from sim.ik import JointPath, plan_joints
 from sim.path import ScrewPath
 from sim.robot import RobotModel
-from sim.scenario import Scenario
+from sim.scenario import GRAVITY, Scenario
 from sim.settings import Control
 from sim.statics import Statics
 from synthesis import InvalidInputError, Problem
 from synthesis.contact import Array
 from synthesis.path_problem import Accelerations, InertialTorques, Load, PathProblem, Rates
+from synthesis.sensitivity import Gravity
+from synthesis.uncertainty_set import UncertaintySet
 
 # Degree of the spline through the joint angles, and their pose error [m and rad]: a cubic one and
 # a tenth of the accuracy suffice to follow angles, but not for their second derivative.
 _DEGREE, _SOLVED = 7, 1e-10
+
+CERTAIN = UncertaintySet()
 
 
 @dataclass(frozen=True)
@@ -60,7 +64,7 @@ class Margins:
 
 
 def path_problem(
-    scenario: Scenario, margins: Margins, points: int, worlds: Sequence[Scenario] = ()
+    scenario: Scenario, margins: Margins, points: int, uncertainty: UncertaintySet = CERTAIN
 ) -> tuple[PathProblem, BSpline, tuple[str, ...]]:
     """The path problem of a scenario's tilt, the joint angles over its share, and the joints.
 
@@ -68,34 +72,44 @@ def path_problem(
         scenario: The scene, whose path the arms follow.
         margins: What to keep clear of.
         points: Grid points.
-        worlds: What may be true instead, in mass, centre of mass, inertia or friction: one timing
-            and one grip then serve them all. The scenario alone if left out.
+        uncertainty: By how much the world may differ: one timing and one grip serve all of the
+            set. Its share of friction comes on top of the margins' factor. The first load is the
+            scenario itself, with the set's friction.
 
     Raises:
         PathError: The arms cannot follow the path.
     """
     robot, path = RobotModel(scenario), ScrewPath(scenario.path)
     control = Control(friction_factor=margins.friction_factor, preload=margins.grip_min)
-    believed = [_gripped(world, margins.grip_max) for world in worlds or (scenario,)]
-    statics = [Statics(world, control, robot) for world in believed]
+    nominal = UncertaintySet(friction=uncertainty.friction)
+    sets = [(scenario, nominal)]
+    if replace(uncertainty, friction=0.0) != CERTAIN:
+        # What is left of the set at the corners of mass and centre of mass.
+        rest = replace(uncertainty, mass=0.0, center=(0.0, 0.0, 0.0))
+        sets += [(corner, rest) for corner in _corners(scenario, uncertainty)]
+    worlds = [_gripped(world, margins.grip_max) for world, _ in sets]
+    statics = [Statics(world, control, robot) for world in worlds]
     curve = tilting_curve(plan_joints(scenario, _SOLVED))
     s = np.linspace(0.0, 1.0, points)
     q, slope, curvature = curve(s), curve(s, 1), curve(s, 2)
-    problems: list[list[Problem]] = [[] for _ in believed]
+    problems: list[list[tuple[Problem, ...]]] = [[] for _ in worlds]
     torques = np.empty((2, *q.shape))
     for k in range(points):
         robot.update(q[k])
         torques[:, k] = robot.inertial_torques(slope[k], curvature[k])
         R_WO, p_WO = path.pose(path.end * s[k])
         quaternion = Rotation.from_matrix(R_WO).as_quat(scalar_first=True)
-        for of_world, world in zip(problems, statics, strict=True):
-            of_world.append(_within(world.problem(p_WO, quaternion), margins.limits))
+        for i, world in enumerate(worlds):
+            at_rest = statics[i].problem(p_WO, quaternion, path.end * s[k])
+            limited = _within(at_rest, margins.limits)
+            problems[i].append(sets[i][1].worlds(limited, _gravity(world, R_WO)))
     rates, accelerations = _tips(scenario, margins, path, s)
     problem = PathProblem(
         s=s,
         loads=tuple(
-            Load(tuple(of_world), *inertial_wrenches(world, path, s))
-            for of_world, world in zip(problems, believed, strict=True)
+            Load(along_path, *wrenches)
+            for i, wrenches in enumerate(inertial_wrenches(world, path, s) for world in worlds)
+            for along_path in zip(*problems[i], strict=True)
         ),
         inertial_torques=InertialTorques(torques[0], torques[1], slope * robot.damping),
         rates=Rates(
@@ -106,6 +120,29 @@ def path_problem(
         accelerations=accelerations,
     )
     return problem, curve, robot.joints
+
+
+def _corners(scenario: Scenario, uncertainty: UncertaintySet) -> list[Scenario]:
+    """The scenario with every extreme of mass and centre of mass."""
+    thing = scenario.object
+    shares = {1.0 - uncertainty.mass, 1.0 + uncertainty.mass}
+    places = [
+        {place - offset, place + offset}
+        for place, offset in zip(thing.center_of_mass, uncertainty.center, strict=True)
+    ]
+    corners = []
+    for share, x, y, z in itertools.product(sorted(shares), *map(sorted, places)):
+        a, b, c = (share * moment for moment in thing.inertia)
+        other = replace(thing, mass=share * thing.mass, inertia=(a, b, c), center_of_mass=(x, y, z))
+        corners.append(replace(scenario, object=other))
+    return corners
+
+
+def _gravity(scenario: Scenario, R_WO: Array) -> Gravity:
+    """The weight of a scenario's object, in its axes."""
+    thing = scenario.object
+    down_O = R_WO.T @ np.array([0.0, 0.0, -1.0])
+    return Gravity(thing.mass * GRAVITY, down_O, np.asarray(thing.center_of_mass))
 
 
 def _gripped(scenario: Scenario, grip_max: float) -> Scenario:

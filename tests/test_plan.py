@@ -12,6 +12,7 @@ from synthesis import InfeasibleError, InvalidInputError, Synthesizer
 from synthesis.contact import N
 from synthesis.path_problem import PathObjective
 from synthesis.path_synthesizer import solve_path
+from synthesis.uncertainty_set import UncertaintySet
 from tests.inverse_dynamics import InverseDynamics, at_stations
 from tests.plans import BOX, CYLINDER, MARGINS, NAMES, fastest
 
@@ -29,8 +30,8 @@ def between(plan, parts=5):
 def test_the_box_tilts_in_at_most_1_1_s():
     found = fastest(BOX)
     assert 0.95 < found.duration <= 1.1
-    # One core takes about 0.1 s; so much is left for a busy machine.
-    assert found.solution.solve_s <= 0.5
+    # One core takes about 0.1 s; the best of three, as others may be busy beside it.
+    assert min(solve_path(found.solution.problem).solve_s for _ in range(3)) <= 0.5
     assert found.solution.residuals.primal < 1e-8
     assert found.solution.residuals.dual < 1e-8
     assert found.solution.residuals.gap < 1e-8
@@ -166,7 +167,7 @@ def test_a_stretched_plan_remains_feasible(name, factor):
 
 
 def test_a_hastened_plan_is_refused_by_the_joint_that_is_too_slow():
-    with pytest.raises(PlanError, match=r"speed of \w+_e1 at"):
+    with pytest.raises(PlanError, match=r"speed of \w+_e1 at \d"):
         fastest(BOX).stretched(0.9)
 
 
@@ -215,18 +216,39 @@ def test_soft_hands_take_longer_and_keep_their_limits():
     assert shares["acceleration of left"].max() == pytest.approx(1.0, abs=1e-6)
 
 
-def test_a_plan_for_several_worlds_serves_each_with_one_grip():
-    nominal = scenario(BOX)
-    worlds = [
-        replace(nominal, object=replace(nominal.object, mass=share * nominal.object.mass))
-        for share in (0.9, 1.1)
-    ]
-    found = plan(nominal, MARGINS[BOX], points=40, worlds=worlds)
-    light, heavy = found.solution.w_OC_C
-    assert light[:, :2, N] == pytest.approx(heavy[:, :2, N], abs=0.0)
+def test_a_robust_plan_serves_its_set_with_one_grip_and_not_more():
+    nominal, margins = scenario(BOX), replace(MARGINS[BOX], friction_factor=1.0)
+    uncertainty = UncertaintySet(mass=0.1, center=(0.01, 0.0, 0.0), friction=0.15)
+    found = plan(nominal, margins, points=30, uncertainty=uncertainty)
+    grips = [w_OC_C[:, :2, N] for w_OC_C in found.solution.w_OC_C]
+    assert len(grips) == 1 + 2 * 2
+    assert all((grip == grips[0]).all() for grip in grips)
     assert found.solution.residuals.primal < 1e-6
-    alone = [plan(world, MARGINS[BOX], points=40).duration for world in worlds]
-    assert found.duration >= max(alone) - 1e-6
+    # A world within the set, in the plan's timing and with its grip: forces exist.
+    thing = nominal.object
+    drawn = replace(thing, mass=1.07 * thing.mass, center_of_mass=(-0.004, 0.0, 0.0))
+    assert servable(found, replace(nominal, object=drawn), 0.86)
+    # One far outside is not served.
+    assert not servable(found, replace(nominal, object=replace(thing, mass=1.6 * thing.mass)), 0.86)
+
+
+def servable(planned, world, friction):
+    """Whether forces exist in another world at a plan's timing and with its grip."""
+    margins = replace(planned.margins, friction_factor=friction, limits=1.0)
+    problem, _, _ = path_problem(world, margins, len(planned.times))
+    a, b = planned.solution.motion
+    synthesizer = Synthesizer()
+    for k, (point, _) in enumerate(problem.stations):
+        moving, grip = problem.moving(0, point, a[k], b[k]), planned.solution.w_OC_C[0][k, :, N]
+        contacts = [
+            replace(c, f_n_min=0.9999 * f_n, f_n_max=1.0001 * f_n) if i < 2 else c
+            for i, (c, f_n) in enumerate(zip(moving.contacts, grip, strict=True))
+        ]
+        try:
+            synthesizer.solve(replace(moving, contacts=tuple(contacts)))
+        except InfeasibleError:
+            return False
+    return True
 
 
 # --- refusals

@@ -43,6 +43,15 @@ def test_a_plan_takes_its_margins_from_the_scenario_where_none_are_given(tmp_pat
     assert content["margins"]["grip_min"] == 10.0
 
 
+def test_a_plan_can_serve_an_uncertain_object(tmp_path):
+    arguments = ["box-tilt", "--mass", "0.1", "--friction", "0.1"]
+    code, content = planned(tmp_path, *arguments)
+    assert code == 0
+    assert np.shape(content["stations"]["torque"]) == (3, 38, 14)
+    _, certain = planned(tmp_path / "other", "box-tilt")
+    assert content["duration_s"] > certain["duration_s"]
+
+
 def test_a_plan_can_be_stretched(tmp_path):
     _, content = planned(tmp_path, "box-tilt", "--stretch", "2")
     assert 2.0 < content["duration_s"] < 2.3
