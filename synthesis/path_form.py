@@ -227,23 +227,23 @@ class PathForm:
             self._acceleration_cones()
 
     def _timing_cones(self) -> None:
-        """(1 + b) / 2 >= ||(c, (1 - b) / 2)||; (t + r) / 2 >= ||(w, (t - r) / 2)||."""
+        """(1 + b) / 2 >= ||(c, (1 - b) / 2)||; (t + r) / 2 >= ||(w, (t - r) / 2)||, r = c + c'."""
+        # Rates in units of the path's length per timescale, and the time of each interval in units
+        # of its share of it: all are about 1.
+        length, share = self._ds.sum(), self._ds / self._ds.sum()
         # Rates at the ends are constants: their cones would have no interior, and say nothing.
         s, b, c = self.problem.s[1:-1], self._b[1:-1], self._c[1:-1]
         if len(s):
             rows = self.rows.new(np.tile([0.5, 0.0, 0.5], (len(s), 1)), s, [""] * 3)
-            self.rows.add(-0.5, rows[:, 0], b)
-            self.rows.add(-1.0, rows[:, 1], c)
-            self.rows.add(0.5, rows[:, 2], b)
+            self.rows.add(-0.5 / length**2, rows[:, 0], b)
+            self.rows.add(-1.0 / length, rows[:, 1], c)
+            self.rows.add(0.5 / length**2, rows[:, 2], b)
             self.rows.second_order(rows)
-        # The time of each interval in units of its share of the timescale: all are about 1.
-        share = self._ds / self._ds.sum()
-        middle = np.sqrt(2.0 * self._ds / share)
-        h = np.stack([0.0 * share, middle, 0.0 * share], axis=1)
+        h = np.tile([0.0, math.sqrt(2.0), 0.0], (len(share), 1))
         rows = self.rows.new(h, self.problem.s[:-1], [""] * 3)
         for column in (self._c[:-1], self._c[1:]):
-            self.rows.add(-0.5, rows[:, 0], column)
-            self.rows.add(0.5, rows[:, 2], column)
+            self.rows.add(-0.5 / length, rows[:, 0], column)
+            self.rows.add(0.5 / length, rows[:, 2], column)
         self.rows.add(-0.5 / share, rows[:, 0], self._t)
         self.rows.add(-0.5 / share, rows[:, 2], self._t)
         self.rows.second_order(rows)

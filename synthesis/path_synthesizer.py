@@ -20,7 +20,8 @@ from synthesis.path_problem import PathObjective, PathProblem
 from synthesis.path_solution import PathSolution
 from synthesis.solver import SOLVED, fallback_settings, solver_settings
 
-# How far limits may be exceeded before the timing is sought again about the last one [-].
+# How far limits may be exceeded before the problem is solved again about the last timing, with its
+# viscous friction, as a share [-]; and how often that may be.
 _EXCESS = 1e-6
 _SOLVES = 10
 # The least improvement of the friction utilisation that is worth another solve [-].
@@ -38,7 +39,7 @@ def solve_path(problem: PathProblem) -> PathSolution:
 
     Raises:
         InfeasiblePathError: No timing and forces satisfy the constraints; says where and which.
-        UnboundedError: The objective improves without limit: nothing limits speed.
+        UnboundedError: The objective improves without limit, as with a grip that nothing bounds.
         SolverError: The solver gave neither, or repeated solves do not settle viscous friction.
     """
     found = _optimum(PathForm(problem))
@@ -121,9 +122,8 @@ def _optimality(form: PathForm, A: Array, h: Array, x: Array, z: Array) -> tuple
     quadratic = form.P @ x
     stationarity = float(np.abs(quadratic + form.q + A.T @ z).max())
     primal, dual = 0.5 * x @ quadratic + form.q @ x, -0.5 * x @ quadratic - h @ z
-    return max(stationarity, form.rows.dual_violation(z)), abs(primal - dual) / max(
-        1.0, abs(primal)
-    )
+    gap = float(abs(primal - dual)) / max(1.0, float(abs(primal)))
+    return max(stationarity, form.rows.dual_violation(z)), gap
 
 
 def _proof(form: PathForm, A: Array, h: Array, z: Array) -> InfeasiblePathError:

@@ -111,6 +111,21 @@ def test_viscous_friction_counts_with_the_exact_rate(damping):
     assert fine.residuals.primal < 1e-6
 
 
+def test_the_unit_of_the_path_coordinate_does_not_matter():
+    own, factor = carriage(robot=1.0, damping=0.5, speed=1.2), 90.0
+    torques, load = own.inertial_torques, own.loads[0]
+    other = replace(
+        own,
+        s=factor * own.s,
+        loads=(replace(load, w_a_O=load.w_a_O / factor, w_b_O=load.w_b_O / factor**2),),
+        inertial_torques=InertialTorques(
+            torques.tau_a / factor, torques.tau_b / factor**2, torques.tau_c / factor
+        ),
+        rates=replace(own.rates, slopes=own.rates.slopes / factor),
+    )
+    assert solve_path(other).duration == pytest.approx(solve_path(own).duration, rel=1e-7)
+
+
 def test_an_acceleration_limit_holds():
     limited = Accelerations(
         ("tip",),
