@@ -27,7 +27,7 @@ from synthesis import (
     UnboundedError,
 )
 from synthesis.best_effort import BestEffort, best_effort
-from synthesis.contact import Array
+from synthesis.contact import Array, N
 
 
 @dataclass(eq=False, slots=True)  # one every step, and a frozen one takes thrice as long
@@ -83,7 +83,7 @@ class Controller:
         self._free = joint_path.schedule.free
         self._statics = Statics(scenario, control, robot, grip)
         self._synthesizer = Synthesizer()
-        self._drives = Drives(robot, control.bandwidth, len(scenario.contact_names))
+        self._drives = Drives(scenario, control, robot)
         self._channel = channel or Channel(NO_DEVIATION)
         self._observer = PoseObserver(ScrewPath(scenario.path), control.pose_filter_s)
         self._tick = 0
@@ -119,11 +119,13 @@ class Controller:
         """Sends the forces of a solution, if there is one; returns whether there was."""
         m = measurement
         pose = self._observer.update(m.t, m.p_WO, m.quat_WO, tilt_ref)
-        problem = self._statics.problem(*pose)
+        problem = self._statics.problem(*pose, tilt_ref)
         forces = self._solve(problem)
         if forces is None:
             return False
-        setpoint = Setpoint(forces.tau - self._drives.tau_g, forces.w_OC_C)
+        assert problem.joints is not None
+        J_n = problem.joints.J_C[:, N]
+        setpoint = Setpoint(forces.tau - self._drives.tau_g, forces.w_OC_C, J_n)
         self._channel.send(measurement.t, setpoint)
         return isinstance(forces, Solution)
 

@@ -7,6 +7,16 @@ with :math:`f^*` the forces of the last setpoint that has arrived, s the share o
 schedule asks for and D the joints' viscous friction. The mass matrix M gives every joint, light or
 heavy, the same bandwidth :math:`\omega`: damping that is explicit in time stays stable on light
 wrists.
+
+A stiff impedance would also oppose the squeeze, by which the hands sink into what they hold. So
+that the force there is the one asked for, it leaves the squeeze to the feed-forward: with J_n the
+Jacobian of the hands' normal directions and e the unit vector along their commanded normal forces,
+M above becomes
+
+.. math:: M - J_n^T e\, e^T \Lambda J_n, \qquad \Lambda = (J_n M^{-1} J_n^T)^{-1}
+
+which takes away the normal forces along e that :math:`M \ddot q` means to hands that cannot move
+along their normals (Khatib 1987, the operational space formulation).
 """
 
 from __future__ import annotations
@@ -19,7 +29,9 @@ from sim.channel import Setpoint
 from sim.plant import Measurement
 from sim.references import Target
 from sim.robot import RobotModel
-from synthesis.contact import Array
+from sim.scenario import Scenario
+from sim.settings import Control
+from synthesis.contact import Array, N
 
 
 class Drives:
@@ -30,12 +42,14 @@ class Drives:
         w_held: Wrenches on the object that the last torques were to make [N, N·m], (m, 6).
     """
 
-    def __init__(self, robot: RobotModel, bandwidth: float, contacts: int) -> None:
-        """Takes over the model of the robot, which whoever updates it shares [rad/s]."""
-        self._robot, self._bandwidth = robot, bandwidth
+    def __init__(self, scenario: Scenario, control: Control, robot: RobotModel) -> None:
+        """Takes over the model of the robot, which whoever updates it shares."""
+        self._robot, self._control = robot, control
         joints = len(robot.joints)
         self.tau_g = np.zeros(joints)
-        self._setpoint = Setpoint(np.zeros(joints), np.zeros((contacts, 6)))
+        contacts, hands = len(scenario.contact_names), len(scenario.hands)
+        none = np.zeros(joints), np.zeros((contacts, 6)), np.zeros((hands, joints))
+        self._setpoint = Setpoint(*none)
         self._share, self._tau_held, self.w_held = math.nan, self.tau_g, self._setpoint.w_OC_C
         # Deviations of angles and speeds, and torques per each of them: both terms in one product.
         self._deviation, self._gains = np.zeros((2, joints)), np.zeros((joints, 2, joints))
@@ -43,10 +57,22 @@ class Drives:
     def update_model(self, q: Array) -> None:
         """Takes over joint angles [rad or m], (l,), for gravity and gains until the next update."""
         self._robot.update(q)
-        omega, mass_matrix = self._bandwidth, self._robot.mass_matrix()
+        omega, mass_matrix = self._control.bandwidth, self._robot.mass_matrix()
+        if self._control.yielding_squeeze:
+            mass_matrix = self._without_squeeze(mass_matrix)
         self._gains[:, 0], self._gains[:, 1] = omega**2 * mass_matrix, 2.0 * omega * mass_matrix
         self.tau_g = self._robot.gravity()
         self._share = math.nan  # what was held is to be found anew
+
+    def _without_squeeze(self, mass_matrix: Array) -> Array:
+        """The mass matrix less its part along the squeeze that is asked for."""
+        J_n, f_n = self._setpoint.J_n, self._setpoint.w_OC_C[: len(self._setpoint.J_n), N]
+        squeeze = float(np.linalg.norm(f_n))
+        if self._share == 0.0 or squeeze == 0.0:
+            return mass_matrix
+        e = f_n / squeeze
+        inertia = np.linalg.inv(J_n @ np.linalg.solve(mass_matrix, J_n.T))
+        return mass_matrix - np.outer(e @ J_n, e @ inertia @ J_n)
 
     def follow(self, setpoint: Setpoint) -> None:
         """Takes over a setpoint that has arrived."""

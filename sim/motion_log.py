@@ -55,8 +55,9 @@ class MotionLog:
         """
         steps = len(positions)
         positions[:] = self._site[:steps, self._tips]
+        # Rotations to rounding, for MuJoCo makes them of unit quaternions.
         axes = self._axes[:steps, self._tips].reshape(-1, 3, 3)
-        flat = Rotation.from_matrix(axes).as_quat(scalar_first=True)
+        flat = Rotation.from_matrix(axes, assume_valid=True).as_quat(scalar_first=True)
         quaternions[:] = flat.reshape(quaternions.shape)
         twists[:] = self._twists(self._hands, positions)
 

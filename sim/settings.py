@@ -86,6 +86,9 @@ class Control:
             applied, instead of the last that did.
         solve_every: Physics steps per synthesis.
         bandwidth: Natural frequency of the joint impedance, which is critically damped [rad/s].
+        yielding_squeeze: Whether the impedance leaves the hands' squeeze to the feed-forward.
+        uncertainty: What the grip has to bear beyond the belief, with the true friction; None for
+            the fixed margins of ``friction_factor`` and ``preload`` alone.
         pose_filter_s: Time constant with which the object's measured pose is smoothed [s].
     """
 
@@ -96,6 +99,8 @@ class Control:
     best_effort: bool = False
     solve_every: int = 4
     bandwidth: float = 30.0
+    yielding_squeeze: bool = False
+    uncertainty: UncertaintySet | None = None
     pose_filter_s: float = 0.0
 
     def __post_init__(self) -> None:
@@ -113,8 +118,10 @@ _BORNE = UncertaintySet(mass=0.25, center=(0.025,) * 3, friction=0.25, placement
 def controllers(control: Control) -> dict[str, Control]:
     """The controllers by name, made from a scenario's own control.
 
-    ``robust`` grips for every world of an uncertainty set and is stiffer, ``margin`` is that control; ``paper`` is (17) as printed, with the full friction and no preload;
-    ``no-feedforward`` applies joint impedance and gravity compensation alone.
+    ``robust`` presses hard enough for every world of an uncertainty set, smooths the measured
+    pose and follows the path more stiffly; ``margin`` is the scenario's own control; ``paper`` is
+    (17) as printed, with the full friction and no preload; ``no-feedforward`` applies joint
+    impedance and gravity compensation alone.
     """
     return {
         "robust": replace(
@@ -122,6 +129,7 @@ def controllers(control: Control) -> dict[str, Control]:
             preload=max(control.preload, 25.0),
             uncertainty=_BORNE,
             bandwidth=100.0,
+            yielding_squeeze=True,
             pose_filter_s=0.05,
         ),
         "margin": control,

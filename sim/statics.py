@@ -15,7 +15,6 @@ from sim.settings import Control
 from synthesis import Contact, Problem
 from synthesis.contact import Array, skew
 
-
 # Contacts are made once for each of these steps, over which the least grip changes by 0.2 N [deg].
 _GRIP_STEP_DEG = 0.5
 
@@ -53,7 +52,7 @@ class Statics:
         # Stacked over the moment about the object frame: the wrench of a force at the centre.
         self._at_center = np.vstack([np.eye(3), skew(center_O)])
 
-    def problem(self, p_WO: Array, quat_WO: Array, tilt: float) -> Problem:
+    def problem(self, p_WO: Array, quat_WO: Array, tilt: float = 0.0) -> Problem:
         """The problem at the angles that the robot was last updated to.
 
         Args:

@@ -34,6 +34,7 @@ from __future__ import annotations
 
 from collections.abc import Hashable
 from itertools import pairwise
+from typing import Any
 
 import clarabel
 import numpy as np
@@ -87,6 +88,9 @@ class ConicForm:
             [6 * hand_rank[f // 6] + f % 6 for f in self.flat[self.hand_columns]], dtype=np.intp
         )
         self.hand_normals = self.normal_columns[hands]
+        # Flat position in the (m, 6, 6) grasp maps of each entry of the equilibrium rows.
+        contact, component = np.divmod(self.flat, 6)
+        self._G_entries = 36 * contact + 6 * np.arange(6)[:, None] + component
 
         margin = objective is Objective.FRICTION_MARGIN
         preloaded = [
@@ -94,6 +98,7 @@ class ConicForm:
         ]
         self.preloaded = np.flatnonzero(preloaded)
         self.limited = np.flatnonzero(np.isfinite(facts.f_n_max))
+        self._bounds = np.concatenate([self.preloaded, len(contacts) + self.limited])
         none = np.zeros(0, dtype=np.intp)
         bounded = joints if torque_limits else None
         self.upper = none if bounded is None else np.flatnonzero(np.isfinite(bounded.tau_max))
@@ -129,6 +134,7 @@ class ConicForm:
             self.norm_rows,
             self.cone_rows,
         ) = slices
+        self._bound_rows = slice(self.f_n_min_rows.start, self.f_n_max_rows.stop)
         self.rows = int(ends[-1])
         self.cone_variables = np.concatenate(
             [np.arange(starts[i], starts[i] + w) for i, w in self.cones] or [np.zeros(0, np.intp)]
@@ -136,12 +142,16 @@ class ConicForm:
         offsets = np.cumsum([0] + [w for _, w in self.cones])[:-1]
         self.cone_heads = self.cone_rows.start + offsets
         self.cone_contacts = np.array([i for i, _ in self.cones], dtype=np.intp)
-        self.clarabel_cones = [clarabel.ZeroConeT(6)]
-        if nonnegative := sum(sizes[1:6]):
-            self.clarabel_cones.append(clarabel.NonnegativeConeT(nonnegative))
-        if cone:
-            self.clarabel_cones.append(clarabel.SecondOrderConeT(cone))
-        self.clarabel_cones += [clarabel.SecondOrderConeT(w) for _, w in self.cones]
+
+    @property
+    def clarabel_cones(self) -> list[Any]:
+        """The cones of the slacks, in the order of the rows."""
+        cones = [clarabel.ZeroConeT(6)]
+        if nonnegative := self.linear_rows.stop - self.equilibrium_rows.stop:
+            cones.append(clarabel.NonnegativeConeT(nonnegative))
+        if norm := self.norm_rows.stop - self.norm_rows.start:
+            cones.append(clarabel.SecondOrderConeT(norm))
+        return cones + [clarabel.SecondOrderConeT(width) for _, width in self.cones]
 
     def force_unit(self, problem: Problem) -> float:
         """Unit of forces and torques inside the solver: the largest load [N or N·m]."""
@@ -173,12 +183,9 @@ class ConicForm:
         facts = problem.contact_set
         unit = self.force_unit(problem)
         f = self.aux_column
-        # Row k of the transposed maps, stacked, is the wrench on the object of variable k.
-        G = problem.G.transpose(0, 2, 1).reshape(-1, 6)[self.flat]
-        A[self.equilibrium_rows, :f] = (G * facts.scale[:, None]).T
+        A[self.equilibrium_rows, :f] = problem.G.take(self._G_entries) * facts.scale
         b[self.equilibrium_rows] = -problem.w_ext_O
-        b[self.f_n_min_rows] = -facts.f_n_min[self.preloaded]
-        b[self.f_n_max_rows] = facts.f_n_max[self.limited]
+        b[self._bound_rows] = facts.bounds.take(self._bounds)
         if self._needs_torque:
             self._torque_rows(A, b, problem, facts.scale)
         if self.objective is Objective.FRICTION_MARGIN:

@@ -124,6 +124,7 @@ class ContactSet:
         reciprocal: Their reciprocals, zero where nothing is transmitted, (m, 6).
         friction: The same for the tangential components alone, (m, 6).
         f_n_min, f_n_max: Bounds of the normal forces [N], (m,).
+        bounds: Right-hand sides of -f_n <= -f_n_min and f_n <= f_n_max [N], (2 m,).
         preload: The largest f_n_min [N].
         largest_bound: The largest finite bound [N].
         structure: What two sets share whose problems differ in numbers only.
@@ -150,8 +151,8 @@ class ContactSet:
         self.f_n_min = np.array([c.f_n_min for c in contacts])
         self.f_n_max = np.array([c.f_n_max for c in contacts])
         self.preload = float(self.f_n_min.max())
-        bounds = np.concatenate([self.f_n_min, self.f_n_max])
-        self.largest_bound = float(bounds[np.isfinite(bounds)].max())
+        self.bounds = np.concatenate([-self.f_n_min, self.f_n_max])
+        self.largest_bound = float(np.abs(self.bounds[np.isfinite(self.bounds)]).max())
         # One string, for its hash is kept.
         self.structure = " ".join(
             f"{c.model}|{c.role}|{c.f_n_min > 0.0}|{math.isfinite(c.f_n_max)}" for c in contacts
@@ -201,7 +202,7 @@ _SKEW = np.array(
 
 def skew(p: Array) -> Array:
     """Cross-product matrices S(p) of vectors p, (..., 3) -> (..., 3, 3), with S(p) z = p x z."""
-    return (p @ _SKEW).reshape(*p.shape, 3)
+    return p.dot(_SKEW).reshape(*p.shape, 3)
 
 
 def grasp_maps(R_OC: Array, p_OC_O: Array) -> Array:

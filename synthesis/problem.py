@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, field
 from enum import StrEnum
-from functools import cached_property
 from operator import le
 
 import numpy as np
@@ -15,7 +14,8 @@ from synthesis.errors import InvalidInputError
 
 # Rotation matrices come from integrated quaternions: 1e-6 passes those, and nothing mis-scaled.
 _ROTATION_TOLERANCE = 1e-6
-_IDENTITY = np.eye(3)
+# How near 1 a determinant has to be for the quick proof of a rotation.
+_UNIT_DETERMINANT = 1e-2 * _ROTATION_TOLERANCE
 
 
 class Objective(StrEnum):
@@ -111,6 +111,9 @@ class Problem:
         joints: The joints behind the hand contacts; None leaves (15) and (16) out.
         objective: Phi.
         contact_set: What follows from the contacts alone, as arrays; not to be given.
+        G: Grasp maps of all contacts, (m, 6, 6); not to be given.
+        load: The largest load: external wrench, preload and, if torque counts, gravity [N or N·m];
+            not to be given.
 
     Raises:
         InvalidInputError: A field is non-finite, mis-shaped or senseless.
@@ -123,6 +126,8 @@ class Problem:
     joints: Joints | None = None
     objective: Objective = Objective.MAX_NORMAL_FORCE
     contact_set: ContactSet = field(init=False, repr=False)
+    G: Array = field(init=False, repr=False)
+    load: float = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
         m = len(self.contacts)
@@ -130,7 +135,6 @@ class Problem:
         _check_shape("R_OC", self.R_OC, (m, 3, 3))
         _check_shape("p_OC_O", self.p_OC_O, (m, 3))
         _check_shape("w_ext_O", self.w_ext_O, (6,))
-        _check_finite("R_OC", self.R_OC)
         _check_finite("p_OC_O", self.p_OC_O)
         _check_finite("w_ext_O", self.w_ext_O)
         self._check_rotations()
@@ -146,19 +150,24 @@ class Problem:
             raise InvalidInputError("joints", None, f"joints, as objective {self.objective} asks")
         if self.joints is not None:
             self._check_joints(self.joints)
+        object.__setattr__(self, "G", grasp_maps(self.R_OC, self.p_OC_O))
+        object.__setattr__(self, "load", self._load())
 
     def _check_rotations(self) -> None:
-        deviation = self.R_OC @ self.R_OC.transpose(0, 2, 1) - _IDENTITY
-        determinant = np.linalg.det(self.R_OC)
-        # The root of the sum of squares is the quicker, and an upper, bound on the largest one.
-        if not (
-            np.vdot(deviation, deviation) <= _ROTATION_TOLERANCE**2
-            and min(determinant.tolist()) > 0.0
+        squares = _check_finite("R_OC", self.R_OC)
+        determinants = np.linalg.det(self.R_OC)
+        # Of all matrices with determinant 1, rotations alone have a sum of squares as small as 3:
+        # with singular values 1 + e_i it is 3 + 2 sum e_i^2, to second order. Most end here.
+        numbers = determinants.tolist()
+        if (
+            min(numbers) >= 1.0 - _UNIT_DETERMINANT
+            and max(numbers) <= 1.0 + _UNIT_DETERMINANT
+            and squares - len(numbers) - 2.0 * sum(numbers) <= 0.25 * _ROTATION_TOLERANCE**2
         ):
-            proper = np.abs(deviation).max(axis=(1, 2)) <= _ROTATION_TOLERANCE
-            proper &= determinant > 0.0
-            if proper.all():
-                return
+            return
+        deviation = np.abs(self.R_OC @ self.R_OC.transpose(0, 2, 1) - np.eye(3))
+        proper = (deviation.max(axis=(1, 2)) <= _ROTATION_TOLERANCE) & (determinants > 0.0)
+        if not proper.all():
             worst = self.contacts[int(np.argmin(proper))].name
             raise InvalidInputError(
                 f"R_OC[{worst}]", "a matrix that is no rotation", "orthonormal with determinant +1"
@@ -187,17 +196,10 @@ class Problem:
         """Indices of the hand contacts, in the order of the Jacobians."""
         return self.contact_set.hands
 
-    @cached_property
-    def G(self) -> Array:
-        """Grasp maps of all contacts, (m, 6, 6)."""
-        return grasp_maps(self.R_OC, self.p_OC_O)
-
-    @cached_property
-    def load(self) -> float:
-        """The largest load: external wrench, preload and, if torque counts, gravity [N or N·m]."""
-        load = max(float(np.abs(self.w_ext_O).max()), self.contact_set.preload)
+    def _load(self) -> float:
+        load = max(*map(abs, self.w_ext_O.tolist()), self.contact_set.preload)
         if self.joints is not None and self.objective.needs_joints:
-            load = max(load, float(np.abs(self.joints.tau_g).max()))
+            load = max(load, *map(abs, self.joints.tau_g.tolist()))
         return load
 
     def torque(self, w_OC_C: Array) -> Array:
@@ -205,15 +207,19 @@ class Problem:
         if self.joints is None:
             return np.zeros(0)
         J = self.joints.J_C.reshape(-1, len(self.joints.names))
-        return w_OC_C[self.contact_set.hand_rows].ravel() @ J + self.joints.tau_g
+        return w_OC_C[self.contact_set.hand_rows].ravel().dot(J) + self.joints.tau_g
 
 
 def _check_shape(name: str, array: Array, shape: tuple[int, ...]) -> None:
-    if np.shape(array) != shape:
-        raise InvalidInputError(name, f"shape {np.shape(array)}", f"shape {shape}")
+    if array.shape != shape:
+        raise InvalidInputError(name, f"shape {array.shape}", f"shape {shape}")
 
 
-def _check_finite(name: str, array: Array) -> None:
-    # A finite sum of squares proves it at once; where it is not, numbers may be merely large.
-    if not math.isfinite(np.vdot(array, array)) and not np.isfinite(array).all():
+def _check_finite(name: str, array: Array) -> float:
+    """The sum of squares, which if finite proves at once that all numbers are."""
+    flat = array.ravel()
+    squares = float(flat.dot(flat))
+    # Where it is not finite, the numbers may be merely large.
+    if not math.isfinite(squares) and not np.isfinite(array).all():
         raise InvalidInputError(name, "a value that is NaN or infinite", "finite numbers")
+    return squares

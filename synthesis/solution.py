@@ -13,7 +13,8 @@ prove that no forces satisfy the constraints (Farkas): each term is at most zero
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields, replace
+from collections.abc import Callable
+from dataclasses import dataclass, field, fields, replace
 from functools import cached_property
 
 import numpy as np
@@ -140,7 +141,7 @@ class Solution:
         value: Optimal objective [N, N·m or -].
         w_OC_C: Wrenches on the object in contact axes [N, N·m], (m, 6).
         tau: Joint torques [N·m or N], (l,); empty without joints.
-        multipliers: The duals; for the friction margin those of its last parametric problem.
+        unpack: Gives the multipliers; called once they are asked for, for a loop asks for none.
         iterations: Interior-point iterations, summed over all solves.
         solve_s: Time inside the solver [s].
     """
@@ -149,9 +150,14 @@ class Solution:
     value: float
     w_OC_C: Array
     tau: Array
-    multipliers: Multipliers
+    unpack: Callable[[], Multipliers] = field(repr=False)
     iterations: int
     solve_s: float
+
+    @cached_property
+    def multipliers(self) -> Multipliers:
+        """The duals; for the friction margin those of its last parametric problem."""
+        return self.unpack()
 
     @cached_property
     def utilisation(self) -> Array:
@@ -248,7 +254,7 @@ def certificate(problem: Problem, ray: Multipliers) -> Certificate:
     """The certificate made of an unbounded ray of multipliers, scaled to a value of 1."""
     ray = replace(ray, gradient=np.zeros(0))
     value = abs(ray.value(problem)) or 1.0
-    scaled = {field.name: getattr(ray, field.name) / value for field in fields(ray)}
+    scaled = {f.name: getattr(ray, f.name) / value for f in fields(ray)}
     return Certificate(problem=problem, multipliers=Multipliers(**scaled))
 
 

@@ -29,6 +29,8 @@ import math
 import time
 from collections.abc import Callable, Hashable
 from dataclasses import dataclass, replace
+from functools import partial
+from operator import le
 
 import clarabel
 import numpy as np
@@ -38,7 +40,7 @@ from numpy.typing import NDArray
 from synthesis.conic import ConicForm, structure
 from synthesis.contact import Array, ContactModel, N
 from synthesis.errors import InfeasibleError, SolverError, UnboundedError
-from synthesis.problem import Objective, Problem
+from synthesis.problem import Joints, Objective, Problem
 from synthesis.solution import Multipliers, Solution, certificate
 from synthesis.solver import SOLVED, fallback_settings, solver_settings
 
@@ -149,7 +151,7 @@ class _Program:
         result = self._update_and_solve(A, b)
         status = str(result.status)
         if status == "PrimalInfeasible":
-            proof = certificate(problem, self._multipliers(problem, result, scale, parameters))
+            proof = certificate(problem, self._multipliers(problem, result, scale, parameters)())
             if proof.proves(_FARTHEST * self.form.force_unit(problem)):
                 raise InfeasibleError(proof)
         if status != "Solved":
@@ -158,10 +160,15 @@ class _Program:
         if not self._balances(x, A, b, _IMBALANCE):
             return None
         solution = self._solution(problem, result, x, scale, parameters, started)
-        joints, tau = problem.joints, solution.tau
-        if joints is None or ((tau <= joints.tau_max) & (tau >= joints.tau_min)).all():
-            return solution
-        return None
+        return solution if self._within_limits(problem.joints, solution.tau) else None
+
+    @staticmethod
+    def _within_limits(joints: Joints | None, tau: Array) -> bool:
+        if joints is None:
+            return True
+        given = tau.tolist()  # lists, for so few numbers, are the quicker
+        low, high = joints.tau_min.tolist(), joints.tau_max.tolist()
+        return all(map(le, low, given)) and all(map(le, given, high))
 
     def solve(self, problem: Problem, parameters: _Parameters) -> Solution:
         """Solves all of (17), with differently set solvers where the prebuilt one stalls."""
@@ -171,7 +178,7 @@ class _Program:
         match str(result.status):
             case "PrimalInfeasible":
                 multipliers = self._multipliers(problem, result, scale, parameters)
-                raise InfeasibleError(certificate(problem, multipliers))
+                raise InfeasibleError(certificate(problem, multipliers()))
             case "DualInfeasible":
                 raise UnboundedError(problem.objective)
         return self._solution(problem, result, np.array(result.x), scale, parameters, started)
@@ -209,8 +216,9 @@ class _Program:
 
     def _balances(self, x: Array, A: Array, b: Array, tolerance: float) -> bool:
         rows = self.form.equilibrium_rows
-        imbalance, forces = A[rows] @ x - b[rows], x[: self.form.aux_column]
-        return math.sqrt(imbalance @ imbalance) <= tolerance * max(1.0, math.sqrt(forces @ forces))
+        imbalance, forces = A[rows].dot(x) - b[rows], x[: self.form.aux_column]
+        size = max(1.0, math.sqrt(forces.dot(forces)))
+        return math.sqrt(imbalance.dot(imbalance)) <= tolerance * size
 
     def _multipliers(
         self,
@@ -218,8 +226,8 @@ class _Program:
         result: clarabel.DefaultSolution,
         scale: Array | float,
         parameters: _Parameters,
-    ) -> Multipliers:
-        return self.form.multipliers(problem, np.array(result.z) * scale, parameters.s)
+    ) -> Callable[[], Multipliers]:
+        return partial(_unpack, self.form, problem, result.z, scale, parameters.s)
 
     def _solution(
         self,
@@ -236,7 +244,7 @@ class _Program:
             value=self.form.value(problem, x),
             w_OC_C=w_OC_C,
             tau=problem.torque(w_OC_C),
-            multipliers=self._multipliers(problem, result, scale, parameters),
+            unpack=self._multipliers(problem, result, scale, parameters),
             iterations=result.iterations,
             solve_s=time.perf_counter() - started,
         )
@@ -250,6 +258,12 @@ class _Program:
         q = np.zeros(self.form.columns)
         q[self.form.aux_column] = 1.0
         return clarabel.DefaultSolver(P, q, A, b, self.form.clarabel_cones, settings)
+
+
+def _unpack(
+    form: ConicForm, problem: Problem, z: list[float], scale: Array | float, s: float
+) -> Multipliers:
+    return form.multipliers(problem, np.array(z) * scale, s)
 
 
 def _largest_margin(
@@ -272,7 +286,7 @@ def _largest_margin(
         solve_s += last.solve_s
         before = loaded
         ratio, loaded = _largest_utilisation(last, unit)
-        best = replace(last if ratio < s else best, multipliers=last.multipliers)
+        best = replace(last if ratio < s else best, unpack=last.unpack)
         stalled = ratio > s - _MARGIN_TOLERANCE and (loaded == before).all()
         if stalled or last.value > -_MARGIN_TOLERANCE:
             break

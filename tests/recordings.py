@@ -39,6 +39,18 @@ class Content:
         order = np.argsort(times, kind="stable")
         return times[order], values[order]
 
+    def poses(self, body, component):
+        """The series of a component of one body's poses, which share an entity with the others'."""
+        entity, frame = "world/poses", [f"tf#/world/{body}"]
+        batches = [b for b in self._batches[entity] if "time" in b.schema.names]
+        frames = [f for b in batches for f in b["Transform3D:child_frame"].to_pylist()]
+        times = np.concatenate([b["time"].cast("int64").to_numpy() for b in batches])
+        # Rows of one time stand in one order in all columns, and sorting by time is stable.
+        order = np.argsort(times, kind="stable")
+        mine = np.array([f == frame for f in frames])[order]
+        times, values = self.series(entity, component)
+        return times[mine], values[mine]
+
     def static(self, entity, component):
         """The last value of something that has no time."""
         batches = [b for b in self._batches[entity] if component in b.schema.names]

@@ -37,6 +37,16 @@ def _smooth(problem):
         (lambda p: {"R_OC": _spoilt(p.R_OC, np.nan)}, "R_OC: got a value"),
         (lambda p: {"R_OC": 1.001 * p.R_OC}, r"R_OC\[left\]"),
         (lambda p: {"R_OC": -p.R_OC}, r"R_OC\[left\]"),
+        # Two that keep volume and handedness: a stretch, a shear.
+        (
+            lambda p: {"R_OC": p.R_OC @ np.diag([1.0 + 2e-6, 1.0 / (1.0 + 2e-6), 1.0])},
+            r"R_OC\[left\]",
+        ),
+        (
+            lambda p: {"R_OC": p.R_OC @ [[1.0, 4e-6, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]]},
+            r"R_OC\[left\]",
+        ),
+        (lambda p: {"R_OC": p.R_OC * [[[1.0]], [[1.0]], [[-1.0]], [[1.0]]]}, r"R_OC\[edge left\]"),
         (lambda p: {"p_OC_O": p.p_OC_O[:, :2]}, "p_OC_O: got shape"),
         (lambda p: {"p_OC_O": _spoilt(p.p_OC_O, np.inf)}, "p_OC_O: got a value"),
         (lambda p: {"w_ext_O": p.w_ext_O[:3]}, "w_ext_O: got shape"),

@@ -1,6 +1,7 @@
 """A recording read back is the run."""
 
 import json
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -21,6 +22,7 @@ ROUNDING = 1e-12
 SINGLE = 2e-7
 POSE_STRIDE = 20  # 50 Hz of 1 kHz
 METERS_PER_NEWTON = 0.003
+CONE_LENGTH = 0.06
 MAX_BYTES = 20e6
 
 
@@ -71,7 +73,7 @@ def test_scene_and_texts_are_there(content):
 def test_meshes_are_real_and_placed_by_moving_links(content):
     mesh = next(e for e in content.entities if e.startswith("world/left_wrist/mesh_"))
     assert len(content.static(mesh, "Mesh3D:vertex_positions")) > 100
-    _, positions = content.series("world/left_wrist", "Transform3D:translation")
+    _, positions = content.poses("left_wrist", "Transform3D:translation")
     # The hands sit 0.225 m from the axis about which they turn by 90 deg.
     assert np.ptp(positions, axis=0).max() > 0.1
 
@@ -117,14 +119,14 @@ def test_a_series_of_another_moment_is_not_the_trace(content, result):
 
 def test_poses_are_the_trace_s_at_50_hz(content, result):
     rows = result.trace.pick(np.arange(0, len(result.trace), POSE_STRIDE))
-    times, positions = content.series("world/box", "Transform3D:translation")
+    times, positions = content.poses("box", "Transform3D:translation")
     assert np.abs(times - rows.t).max() < NANOSECOND
     assert np.abs(positions - rows.p_WO).max() < SINGLE
-    _, quaternions = content.series("world/box", "Transform3D:quaternion")
+    _, quaternions = content.poses("box", "Transform3D:quaternion")
     assert np.abs(quaternions - np.roll(rows.quat_WO, -1, axis=1)).max() < SINGLE
     for i, hand in enumerate(("left", "right")):
         # The tip is the pad's site, 0.08 m out along the hand's z axis: the same turn.
-        _, quaternions = content.series(f"world/{hand}_pad", "Transform3D:quaternion")
+        _, quaternions = content.poses(f"{hand}_pad", "Transform3D:quaternion")
         tip = np.roll(rows.quat_WE[:, i], -1, axis=1)
         assert np.abs(np.abs(np.sum(quaternions * tip, axis=1)) - 1.0).max() < SINGLE
 
@@ -136,10 +138,12 @@ def test_arrows_are_the_forces_to_scale_at_their_contacts(content, result, conta
     rows, R_WC = result.trace.pick(steps), result.history.R_WC[steps]
     commanded = np.einsum("kij,kj->ki", R_WC[:, i], rows.w_command_C[:, i, :3])
     for kind, forces in (("measured", rows.f_W[:, i, :3]), ("commanded", commanded)):
-        times, vectors = content.series(f"forces/{kind}/{contact}", "Arrows3D:vectors")
+        times, vectors = content.series(f"forces/{kind}", "Arrows3D:vectors")
         assert np.abs(times - rows.t).max() < NANOSECOND
+        vectors = vectors.reshape(len(rows), len(CONTACTS), 3)[:, i]
         assert np.abs(vectors - METERS_PER_NEWTON * forces).max() < SINGLE
-        _, origins = content.series(f"forces/{kind}/{contact}", "Arrows3D:origins")
+        _, origins = content.series(f"forces/{kind}", "Arrows3D:origins")
+        origins = origins.reshape(len(rows), len(CONTACTS), 3)[:, i]
         assert np.abs(origins - rows.p_WC[:, i]).max() < SINGLE
     # They are forces that hold 20 N, so some centimetres long.
     assert np.linalg.norm(METERS_PER_NEWTON * rows.f_W[:, i, :3], axis=1).max() > 0.01
@@ -149,15 +153,35 @@ def test_arrows_are_the_forces_to_scale_at_their_contacts(content, result, conta
 def test_cones_open_by_the_true_friction_about_the_normal(content, result, contact):
     i = CONTACTS.index(contact)
     mu = (*SCENARIO.hands, *SCENARIO.supports)[i].friction.mu
-    rim = np.array(content.static(f"cones/{contact}", "LineStrips3D:strips")[-1])
-    slopes = np.linalg.norm(rim[:, :2], axis=1) / rim[:, 2]
-    assert np.abs(slopes - mu).max() < SINGLE
     steps = np.arange(0, len(result.trace), POSE_STRIDE)
-    _, matrices = content.series(f"cones/{contact}", "Transform3D:mat3x3")
-    # Column-major: the last three numbers are the cone's axis.
-    assert np.abs(matrices[:, 6:] - result.history.R_WC[steps, i, :, 2]).max() < SINGLE
-    _, apexes = content.series(f"cones/{contact}", "Transform3D:translation")
-    assert np.abs(apexes - result.trace.p_WC[steps, i]).max() < SINGLE
+    times, points = content.series("cones", "LineStrips3D:strips")
+    assert np.abs(times - result.trace.t[steps]).max() < NANOSECOND
+    strip = points.reshape(len(steps), len(CONTACTS), -1, 3)[:, i]
+    apex, rim = strip[:, 0], strip[:, 1:7] - strip[:, :1]
+    assert np.abs(apex - result.trace.p_WC[steps, i]).max() < SINGLE
+    # In contact axes (t, o, n) every ray is the friction cone's, all around; a slope is what is
+    # stored over the cone's length.
+    rays = np.einsum("kji,kpj->kpi", result.history.R_WC[steps, i], rim)
+    slopes = np.linalg.norm(rays[..., :2], axis=2) / rays[..., 2]
+    assert np.abs(slopes - mu).max() < SINGLE / CONE_LENGTH
+    assert np.abs(rays[..., 2] - CONE_LENGTH).max() < SINGLE
+    assert np.abs(rays[..., :2].mean(axis=1)).max() < SINGLE
+    # What follows are the same points again: every ray is drawn, and the rim closed.
+    drawn = {frozenset(pair) for pair in pairwise([0, 1, 2, 3, 4, 5, 6, 1, 2, 0, 3, 4, 0, 5, 6, 0])}
+    assert strip.shape[1] == 16
+    assert np.array_equal(strip[:, 7:], strip[:, [1, 2, 0, 3, 4, 0, 5, 6, 0]])
+    rays_and_rim = {frozenset((0, k)) for k in range(1, 7)}
+    rays_and_rim |= {frozenset((k, k % 6 + 1)) for k in range(1, 7)}
+    assert drawn == rays_and_rim
+
+
+def test_arrows_and_cones_are_named_after_their_contacts(content):
+    for entity, kind in (
+        ("forces/measured", "Arrows3D"),
+        ("forces/commanded", "Arrows3D"),
+        ("cones", "LineStrips3D"),
+    ):
+        assert tuple(content.static(entity, f"{kind}:labels")) == CONTACTS
 
 
 def test_the_texts_are_verdict_and_configuration(content, result, folder):

@@ -18,7 +18,6 @@ from tests.recordings import NANOSECOND, Content, verified
 ROOT = Path(__file__).parent.parent
 SCENARIO = scenario("box-tilt")
 TOTAL_S = Schedule(SCENARIO).total_s
-CONTACTS = SCENARIO.contact_names
 # What a kill may lose [s of the run], and the block that may be under way at the last report.
 MAY_BE_LOST, BLOCK = 0.5, 0.1
 # Tells on its standard output how many steps are made and handed to the recorder.
@@ -55,15 +54,16 @@ def content_of(path):
 
 def gaps(content, reached):
     """What a killed run that had got to a time [s] lost of it, beyond what it may lose."""
-    rates = {(f"plots/{name}", "Scalars:scalars"): 1000 for name in ("tilt", "slip", "torque")}
-    rates["world/box", "Transform3D:translation"] = 50
-    rates[f"forces/measured/{CONTACTS[-1]}", "Arrows3D:vectors"] = 50
+    plots = {name: f"plots/{name}" for name in ("tilt", "slip", "torque")}
+    times = {name: content.series(plot, "Scalars:scalars")[0] for name, plot in plots.items()}
+    times["box"], _ = content.poses("box", "Transform3D:translation")
+    times["forces"], _ = content.series("forces/measured", "Arrows3D:vectors")
     lost = set()
-    for (entity, component), rate in rates.items():
-        times, _ = content.series(entity, component)
-        even = np.abs(np.diff(times) - 1.0 / rate).max() < 2 * NANOSECOND
-        if not (even and times[0] == 0.0 and times[-1] >= reached - MAY_BE_LOST):
-            lost.add(entity)
+    for name, at in times.items():
+        rate = 1000 if name in plots else 50
+        even = np.abs(np.diff(at) - 1.0 / rate).max() < 2 * NANOSECOND
+        if not (even and at[0] == 0.0 and at[-1] >= reached - MAY_BE_LOST):
+            lost.add(name)
     return lost
 
 

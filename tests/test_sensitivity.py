@@ -183,7 +183,7 @@ def test_sensitivities_from_tampered_multipliers_are_noticed(field):
     solution = SYNTHESIZER.solve(box(40.0))
     gravity = weight_of(solution.problem)
     tampered = replace(solution.multipliers, **{field: 1.01 * getattr(solution.multipliers, field)})
-    found = sensitivities(replace(solution, multipliers=tampered), gravity)
+    found = sensitivities(replace(solution, unpack=lambda: tampered), gravity)
     assert max(deviations(solution.problem, gravity, found).values()) > 10.0 * AGREEMENT
 
 

@@ -14,28 +14,27 @@ from rerun.components import AggregationPolicy
 from sim.contacts import true_contacts
 from sim.monitor import ContactHistory
 from sim.recording.blueprint import TIMELINE, blueprint
-from sim.recording.columns import arrows, frames, scalars
+from sim.recording.columns import arrows, scalars, strips
 from sim.recording.scenery import Scenery
 from sim.scenario import Scenario
 from sim.trace import Trace
 from synthesis.contact import Array, N
 
-_POSE_PERIOD = 0.02  # [s] between poses in the 3D view
-_METERS_PER_NEWTON = 0.003
-_CONE_LENGTH = 0.06  # [m]
-_CONE_RAYS = 6
-_CONE = (250, 190, 40)
 
-
-class _Arrow(NamedTuple):
+class _Look(NamedTuple):
     color: tuple[int, ...]
     radius: float  # [m]
 
 
+_POSE_PERIOD = 0.02  # [s] between poses in the 3D view
+_METERS_PER_NEWTON = 0.003
+_CONE_LENGTH = 0.06  # [m]
+_CONE_RAYS = 6
+_CONE = _Look((250, 190, 40), 0.0003)
 # The commanded arrow is the thin core of the measured one, and shows where they disagree.
 _LOOKS = {
-    "measured": _Arrow((220, 30, 30), 0.006),
-    "commanded": _Arrow((40, 110, 250), 0.002),
+    "measured": _Look((220, 30, 30), 0.006),
+    "commanded": _Look((40, 110, 250), 0.002),
 }
 
 
@@ -68,7 +67,7 @@ class Recorder:
             viewer_url: A viewer that follows the run.
         """
         self._scenario = scenario
-        self._contacts = true_contacts(scenario)
+        self._cones = np.array([_cone(contact.mu) for contact in true_contacts(scenario)])
         self._tau_min, self._tau_max = tau_min, tau_max
         self._stride = max(1, round(_POSE_PERIOD / scenario.physics.timestep))
         # Viewers keep the first blueprint they see per application id.
@@ -107,11 +106,12 @@ class Recorder:
                 names=series, colors=palette, aggregation_policy=AggregationPolicy.MinMax
             )
             self._recording.log(f"plots/{path}", lines, static=True)
-        for contact in self._contacts:
-            self._recording.log(f"cones/{contact.name}", _cone(contact.mu), static=True)
-            for kind, look in _LOOKS.items():
-                arrow = rr.Arrows3D.from_fields(colors=[look.color], radii=[look.radius])
-                self._recording.log(f"forces/{kind}/{contact.name}", arrow, static=True)
+        labels = {"labels": names, "show_labels": False}
+        for kind, look in _LOOKS.items():
+            arrow = rr.Arrows3D.from_fields(colors=[look.color], radii=[look.radius], **labels)
+            self._recording.log(f"forces/{kind}", arrow, static=True)
+        cone = rr.LineStrips3D.from_fields(colors=[_CONE.color], radii=[_CONE.radius], **labels)
+        self._recording.log("cones", cone, static=True)
 
     def _log_text(self, path: str, text: str) -> None:
         document = rr.TextDocument(text, media_type=rr.MediaType.MARKDOWN)
@@ -157,20 +157,14 @@ class Recorder:
             return
         rows = block.pick(picked)
         time = rr.TimeColumn(TIMELINE, duration=rows.t)
-        self._scenery.send_poses(self._recording, rows, time)
+        self._scenery.send_poses(self._recording, rows)
         R_WC = history.R_WC[picked]
         commanded = np.einsum("kmij,kmj->kmi", R_WC, rows.w_command_C[..., :3])
-        for i, contact in enumerate(self._contacts):
-            origins = rows.p_WC[:, i]
-            for kind, forces in (("measured", rows.f_W[:, i, :3]), ("commanded", commanded[:, i])):
-                self._recording.send_columns(
-                    f"forces/{kind}/{contact.name}",
-                    [time],
-                    arrows(origins, _METERS_PER_NEWTON * forces),
-                )
-            self._recording.send_columns(
-                f"cones/{contact.name}", [time], frames(origins, R_WC[:, i])
-            )
+        for kind, forces in (("measured", rows.f_W[..., :3]), ("commanded", commanded)):
+            columns = arrows(rows.p_WC, _METERS_PER_NEWTON * forces)
+            self._recording.send_columns(f"forces/{kind}", [time], columns)
+        cones = rows.p_WC[:, :, None] + np.einsum("kmij,mpj->kmpi", R_WC, self._cones)
+        self._recording.send_columns("cones", [time], strips(cones))
 
     def close(self, verdict: str) -> None:
         """Writes the verdict, as Markdown, and completes the file."""
@@ -196,11 +190,13 @@ def _pale(color: tuple[int, ...]) -> tuple[int, ...]:
     return tuple(round(0.45 * channel + 0.55 * 255) for channel in color)
 
 
-def _cone(mu: float) -> rr.LineStrips3D:
-    """Wire cone of friction mu with its apex at the contact, around the normal."""
+def _cone(mu: float) -> Array:
+    """Wire cone of friction mu in contact axes as one strip, (p, 3): apex, rim, and each ray."""
     angles = np.linspace(0.0, 2.0 * np.pi, _CONE_RAYS, endpoint=False)
     rim = _CONE_LENGTH * np.column_stack(
         [mu * np.cos(angles), mu * np.sin(angles), np.ones(_CONE_RAYS)]
     )
-    rays = [np.array([np.zeros(3), point]) for point in rim]
-    return rr.LineStrips3D([*rays, np.vstack([rim, rim[:1]])], radii=0.0003, colors=[_CONE])
+    apex = np.zeros((1, 3))
+    # Up one ray, along the rim, down the next.
+    rays = [np.vstack([rim[k : k + 2], apex]) for k in range(0, _CONE_RAYS, 2)]
+    return np.vstack([apex, rim, *rays])

@@ -10,6 +10,7 @@ import rerun as rr
 
 from assets import description_path
 from assets.visuals import Visual, load_visuals
+from sim.recording.blueprint import TIMELINE
 from sim.recording.columns import poses
 from sim.scenario import Scenario
 from sim.scene import ObjectMotion, compose, hand_body
@@ -17,6 +18,7 @@ from sim.trace import Trace
 from synthesis.contact import Array
 
 WORLD = "world"
+_POSES = f"{WORLD}/poses"  # one entity holds those of all bodies, whose frames its rows name
 # Edge length of what stands for an infinite plane, and its thickness [m].
 _PLANE_SIZE, _PLANE_THICKNESS = 2.0, 0.002
 
@@ -36,7 +38,7 @@ class Scenery:
         bodies = np.array(sorted(shown))
         moves = (self._model.body_weldid[bodies] != 0) | (self._model.body_mocapid[bodies] >= 0)
         self._moving, self._fixed = bodies[moves], bodies[~moves]
-        self._paths = [self._path(body) for body in self._moving]
+        self._frames = [f"tf#/{self._path(body)}" for body in self._moving]
 
     def _load_visuals(self) -> list[Visual]:
         if self._scenario.robot.description is None:
@@ -88,20 +90,21 @@ class Scenery:
                 static=True,
             )
 
-    def send_poses(self, recording: rr.RecordingStream, rows: Trace, time: rr.TimeColumn) -> None:
+    def send_poses(self, recording: rr.RecordingStream, rows: Trace) -> None:
         """Sends the poses of all moving bodies at the given rows."""
-        positions = np.empty((len(self._moving), len(rows), 3))
-        quaternions = np.empty((len(self._moving), len(rows), 4))
+        positions = np.empty((len(rows), len(self._moving), 3))
+        quaternions = np.empty((len(rows), len(self._moving), 4))
         for k in range(len(rows)):
             self._data.qpos[self._q] = rows.q[k]
             self._data.mocap_pos[self._object] = rows.p_WO[k]
             self._data.mocap_quat[self._object] = rows.quat_WO[k]
             mujoco.mj_kinematics(self._model, self._data)
-            positions[:, k] = self._data.xpos[self._moving]
-            quaternions[:, k] = self._data.xquat[self._moving]
-        xyzw = np.roll(quaternions, -1, axis=2)
-        for path, position, quaternion in zip(self._paths, positions, xyzw, strict=True):
-            recording.send_columns(path, [time], poses(position, quaternion))
+            positions[k] = self._data.xpos[self._moving]
+            quaternions[k] = self._data.xquat[self._moving]
+        time = rr.TimeColumn(TIMELINE, duration=np.repeat(rows.t, len(self._moving)))
+        xyzw = np.roll(quaternions, -1, axis=2).reshape(-1, 4)
+        columns = poses(self._frames * len(rows), positions.reshape(-1, 3), xyzw)
+        recording.send_columns(_POSES, [time], columns)
 
     def _path(self, body: int) -> str:
         return f"{WORLD}/{self._model.body(body).name}"
