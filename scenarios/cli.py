@@ -25,6 +25,7 @@ from scenarios.common import (
 )
 from scenarios.paper.command import Reproduce
 from scenarios.planning import Plan
+from scenarios.sweep import Sweep
 
 if TYPE_CHECKING:
     from sim.report import Report
@@ -73,7 +74,13 @@ class Run:
     """Duration of the tilt [s]; the scenario's own if left out."""
 
     seed: int = 0
-    """Draws the small deviations of the start posture."""
+    """Draws the small deviations of the start posture, and the world."""
+
+    preset: str = "nominal"
+    """How far the world may be from what is believed: nominal, lab, field or harsh."""
+
+    world: str = ""
+    """What to set of the world that was drawn, like friction=0.8,mass=1.1 (factors)."""
 
     out: Path | None = None
     """New or empty folder for the results; logs/SCENARIO-CONTROLLER-TIME if left out."""
@@ -89,6 +96,7 @@ class Run:
         from rich.console import Console
 
         from scenarios.commands import print_explanation
+        from scenarios.sweep import print_outcome
         from sim.report import Verdict
         from sim.run import UnholdableError
         from sim.run import execute as run
@@ -97,17 +105,21 @@ class Run:
         assert request.out is not None
         try:
             with progress_bar(self.scenario) as progress:
-                report = run(request, progress).report
+                result = run(request, progress)
         except UnholdableError as error:
             print_explanation(Console(highlight=False), error.explanation, self.controller)
             print("Nothing has moved; --anyway shows what happens.")
             return FAILED
+        report = result.report
         _print_report(report, request.out)
+        if self.preset != "nominal" or self.world:
+            print_outcome(request.scenario, result)
         codes = {Verdict.PASS: PASSED, Verdict.FAIL: FAILED, Verdict.INTERRUPTED: INTERRUPTED}
         return codes[report.verdict]
 
     def _request(self) -> Request:
         from scenarios import scenario
+        from scenarios.sweep import drawn_world
         from sim.run import Request
         from sim.settings import stretched
         from synthesis.errors import InvalidInputError
@@ -120,8 +132,11 @@ class Run:
             raise InvalidInputError("--seed", self.seed, "an integer >= 0")
         if self.anyway:
             control = replace(control, best_effort=True)
+        world = drawn_world(chosen, self.preset, self.seed, self.world)
         out = results_folder(self.out, f"{self.scenario}-{self.controller}")
-        return Request(chosen, self.controller, control, self.seed, out, self.live, self.anyway)
+        return Request(
+            chosen, self.controller, control, self.seed, out, self.live, self.anyway, world
+        )
 
 
 @dataclass(frozen=True)
@@ -174,6 +189,7 @@ Command = (
     | Annotated[Capacity, tyro.conf.subcommand("capacity")]
     | Annotated[Plan, tyro.conf.subcommand("plan")]
     | Annotated[Reproduce, tyro.conf.subcommand("reproduce")]
+    | Annotated[Sweep, tyro.conf.subcommand("sweep")]
 )
 
 
@@ -198,7 +214,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 def _parse(
     arguments: Sequence[str] | None,
-) -> List | Run | Screenshot | View | Explain | Capacity | Plan | Reproduce:
+) -> List | Run | Screenshot | View | Explain | Capacity | Plan | Reproduce | Sweep:
     """The command asked for; a parse error leaves as one line instead of tyro's box."""
     errors = io.StringIO()
     try:

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import contextlib
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import replace
 from datetime import datetime
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Protocol
 
 if TYPE_CHECKING:
     from sim.scenario import Scenario
@@ -37,19 +37,30 @@ def chosen_control(scenario: Scenario, controller: str, objective: str | None) -
     return replace(control, objective=Objective(objective))
 
 
+class Move(Protocol):
+    """Moves a progress bar to what is done of a total; a note stands beside it."""
+
+    def __call__(self, done: int, total: int, note: str = "") -> None:
+        """Moves it."""
+
+
 @contextlib.contextmanager
-def progress_bar(name: str) -> Iterator[Callable[[int, int], None]]:
+def progress_bar(name: str) -> Iterator[Move]:
     """A progress bar with time left, on stderr; yields the function that moves it."""
     from rich.console import Console
     from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
 
     share, left = TextColumn("{task.percentage:3.0f} %"), TimeRemainingColumn()
-    columns = (TextColumn(name), BarColumn(), share, left)
+    columns = (TextColumn(name), BarColumn(), share, left, TextColumn("{task.fields[note]}"))
     console = Console(stderr=True)
     quiet = not console.is_terminal
     with Progress(*columns, console=console, transient=True, disable=quiet) as bar:
-        task = bar.add_task(name, total=None)
-        yield lambda done, total: bar.update(task, completed=done, total=total)
+        task = bar.add_task(name, total=None, note="")
+
+        def move(done: int, total: int, note: str = "") -> None:
+            bar.update(task, completed=done, total=total, note=note)
+
+        yield move
 
 
 def check_json(path: Path | None) -> None:

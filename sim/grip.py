@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
+from synthesis import Contact
 from synthesis.contact import Array
 
 
@@ -16,7 +17,7 @@ class GripSchedule:
     Attributes:
         tilts: Grid [rad], (k,), rising.
         f_n: Normal forces [N], (k, n).
-        shares: Of the uncertainty set that they serve [-], (k,); 1 is all of it.
+        shares: Of the robustness asked for that they give [-], (k,); 1 is all of it.
     """
 
     tilts: Array
@@ -27,3 +28,12 @@ class GripSchedule:
         """Normal forces at tilts [rad], (j,) -> (j, n); beyond the ends those at the ends."""
         columns = [np.interp(tilts, self.tilts, f_n) for f_n in self.f_n.T]
         return np.stack(columns, axis=-1)
+
+
+def pressed(contacts: tuple[Contact, ...], f_n: Array) -> tuple[Contact, ...]:
+    """Contacts, hands first, with these least normal forces of the n hands [N], (n,)."""
+    hands = (
+        replace(contact, f_n_min=min(float(force), contact.f_n_max))
+        for contact, force in zip(contacts, f_n, strict=False)
+    )
+    return (*hands, *contacts[len(f_n) :])

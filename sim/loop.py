@@ -64,7 +64,7 @@ class ClosedLoop:
             seed: Draws the deviations of the start posture.
             joint_path: The scenario's, where it is planned already.
             world: How the plant deviates from that, and what disturbs it; nothing by default.
-            grip: That of a control with an uncertainty set, where it is planned already.
+            grip: What the control's robustness asks for, where it is planned already.
 
         Raises:
             InvalidInputError: The world does not fit the scenario.
@@ -75,8 +75,7 @@ class ClosedLoop:
         self.robot = robot = RobotModel(scenario)
         joint_path = joint_path or plan_joints(scenario)
         self.truth = world.truth(truth or scenario)
-        if grip is None and control.uncertainty is not None:
-            grip = plan_grip(scenario, control, joint_path)
+        grip = grip or plan_grip(scenario, control, joint_path)
         self._controller = Controller(scenario, control, robot, joint_path, Channel(world), grip)
         self._sensors = Sensors(world)
         self._plant = Plant(self.truth, world)

@@ -1,7 +1,8 @@
 """Plans the grip of the robust controller: one grip that serves every world of a set.
 
-At each tilt of a grid one robust counterpart of (17) is solved with the true friction; where no
-grip serves the whole set, the largest share of it that one does serve counts.
+At each tilt of a grid one robust counterpart of (17) is solved with the true friction. Where no
+grip serves the whole set on top of the whole preload, the largest share of both that one serves
+counts.
 """
 
 from __future__ import annotations
@@ -10,25 +11,28 @@ from dataclasses import replace
 
 import numpy as np
 
-from sim.grip import GripSchedule
+from sim.grip import GripSchedule, pressed
 from sim.ik import JointPath
 from sim.poses import PathProblems
 from sim.scenario import Scenario
-from sim.settings import Control
+from sim.settings import Control, Robustness
 from synthesis import Objective, RobustInfeasibleError, SolverError
 from synthesis.contact import Array
+from synthesis.problem import Problem
 from synthesis.robust import robust_grip
-from synthesis.scaling import largest_scaling
-from synthesis.uncertainty_set import UncertaintySet
+from synthesis.scaling import Scaling, largest_scaling
+from synthesis.sensitivity import Gravity
 
 # Between these steps grip is interpolated; it bends by less than 1 % of its peak in one [deg].
-_STEP_DEG = 2.5
+_STEP_DEG = 5.0
+# Shares are found to within two to the power of minus this.
+_HALVINGS = 4
 
 
 def plan_grip(
     scenario: Scenario, control: Control, joint_path: JointPath | None = None
-) -> GripSchedule:
-    """The least grip that serves the control's uncertainty set, and no less than its preload.
+) -> GripSchedule | None:
+    """The least grip that gives the control its robustness; None if it asks for none.
 
     Args:
         scenario: The scene as it is believed.
@@ -40,13 +44,14 @@ def plan_grip(
         RobustInfeasibleError: At a tilt no forces hold even the nominal object.
         SolverError: The solver gave neither forces nor a proof.
     """
-    uncertainty = control.uncertainty or UncertaintySet()
-    # The set says how much less the friction may be than believed.
-    # The norm makes the forces of unequal hands unique.
-    true = replace(control, friction_factor=1.0, objective=Objective.NORM_NORMAL_FORCE)
-    problems = PathProblems(scenario, true, joint_path=joint_path)
+    if control.robustness is None:
+        return None
+    problems = _true_problems(scenario, control, joint_path)
     tilts_deg = problems.tilts(_STEP_DEG)
-    found = [_grip(problems, float(tilt), uncertainty) for tilt in tilts_deg]
+    found = [
+        _grip(problems.problem(tilt), problems.gravity(tilt), control.robustness)
+        for tilt in tilts_deg.tolist()
+    ]
     return GripSchedule(
         tilts=np.radians(tilts_deg),
         f_n=np.array([f_n for f_n, _ in found]),
@@ -54,12 +59,50 @@ def plan_grip(
     )
 
 
-def _grip(
-    problems: PathProblems, tilt_deg: float, uncertainty: UncertaintySet
-) -> tuple[Array, float]:
-    problem, gravity = problems.problem(tilt_deg), problems.gravity(tilt_deg)
+def borne(scenario: Scenario, control: Control, step_deg: float) -> dict[float, Scaling]:
+    """How much of the set of a robust control one grip bears, by tilt [deg].
+
+    Raises:
+        PathError: The arms cannot follow the path.
+        RobustInfeasibleError: At a tilt no forces hold even the nominal object.
+    """
+    assert control.robustness is not None
+    problems = _true_problems(scenario, control, None)
+    return {
+        tilt: largest_scaling(
+            problems.problem(tilt), problems.gravity(tilt), control.robustness.uncertainty
+        )
+        for tilt in problems.tilts(step_deg).tolist()
+    }
+
+
+def _true_problems(
+    scenario: Scenario, control: Control, joint_path: JointPath | None
+) -> PathProblems:
+    """The problems with the believed friction in full: the set says how much less it may be."""
+    # The norm makes the forces of unequal hands unique.
+    full = replace(control, friction_factor=1.0, objective=Objective.NORM_NORMAL_FORCE)
+    return PathProblems(scenario, full, joint_path=joint_path)
+
+
+def _grip(problem: Problem, gravity: Gravity, robustness: Robustness) -> tuple[Array, float]:
+    """Normal forces of the hands [N], (n,), and the share of the robustness that they give."""
+
+    def serving(share: float) -> Array:
+        least = problem.contact_set.preload
+        preload = max(least, least + share * (robustness.preload - least))
+        hands = np.full(len(problem.hands), preload)
+        squeezed = replace(problem, contacts=pressed(problem.contacts, hands))
+        return robust_grip(robustness.uncertainty.scaled(share).worlds(squeezed, gravity)).f_n
+
     try:
-        return robust_grip(uncertainty.worlds(problem, gravity)).f_n, 1.0
+        return serving(1.0), 1.0
     except (RobustInfeasibleError, SolverError):
-        scaling = largest_scaling(problem, gravity, uncertainty, most=1.0)
-        return scaling.grip.f_n, scaling.factor
+        share, f_n = 0.0, serving(0.0)
+    for step in 0.5 ** np.arange(1, _HALVINGS + 1):
+        try:
+            f_n = serving(share + step)
+        except (RobustInfeasibleError, SolverError):
+            continue
+        share += float(step)
+    return f_n, share

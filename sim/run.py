@@ -34,7 +34,8 @@ from synthesis import (
 )
 
 RECORDING, CONFIG, REPORT = "run.rrd", "config.json", "report.json"
-_PACKAGES = ("mujoco", "dm-control", "mink", "pin", "clarabel", "rerun-sdk", "numpy", "scipy")
+# Whose versions may change a run's numbers.
+PACKAGES = ("mujoco", "dm-control", "mink", "pin", "clarabel", "rerun-sdk", "numpy", "scipy")
 
 # Steps at which the path is checked for forces before anything moves [deg].
 _CHECK_DEG = 5.0
@@ -80,19 +81,23 @@ class UnholdableError(FulcrumError):
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Result:
-    """What a run gave: the verdict and all that it rests on."""
+    """What a run gave: the verdict and all that it rests on; what ended it, if something did."""
 
     report: Report
     trace: Trace
     history: ContactHistory
+    error: str | None = None
 
 
-def execute(request: Request, progress: Progress | None = None) -> Result:
+def execute(
+    request: Request, progress: Progress | None = None, joint_path: JointPath | None = None
+) -> Result:
     """Runs to the end, or until interrupted (SIGINT, SIGTERM), and leaves a complete record.
 
     Args:
         request: What to run.
         progress: Called with steps done and steps in total after every block.
+        joint_path: The scenario's, where :func:`holdable_path` has found it already.
 
     Raises:
         PathError: The arms cannot follow the path; nothing has moved.
@@ -104,9 +109,8 @@ def execute(request: Request, progress: Progress | None = None) -> Result:
     scenario, out = request.scenario, request.out
     if out is not None:
         check_new_folder("out", out)
-    joint_path = None
-    if request.control.feedforward and not request.anyway:
-        joint_path = _feasible_path(scenario, request.control)
+    if joint_path is None and request.control.feedforward and not request.anyway:
+        joint_path = holdable_path(scenario, request.control)
     loop = ClosedLoop(
         scenario,
         request.control,
@@ -160,11 +164,16 @@ def execute(request: Request, progress: Progress | None = None) -> Result:
         if out is not None and recorder is not None:
             write_json(out / REPORT, dataclasses.asdict(report))
             recorder.close(markdown(report))
-    return Result(report, trace, history)
+    return Result(report, trace, history, error)
 
 
-def _feasible_path(scenario: Scenario, control: Control) -> JointPath | None:
-    """The joint path; refused if a certificate proves that no forces exist at one of its tilts."""
+def holdable_path(scenario: Scenario, control: Control) -> JointPath | None:
+    """The joint path; refused if a certificate proves that no forces exist at one of its tilts.
+
+    Raises:
+        PathError: The arms cannot follow the path.
+        UnholdableError: Somewhere on it no forces hold the object.
+    """
     problems, synthesizer = PathProblems(scenario, control), Synthesizer()
     for tilt in problems.tilts(_CHECK_DEG):
         try:
@@ -207,7 +216,7 @@ def resolved_config(request: Request) -> dict[str, Any]:
             "control": dataclasses.asdict(request.control),
             "scenario": dataclasses.asdict(request.scenario),
             "world": dataclasses.asdict(request.world),
-            "versions": {name: version(name) for name in _PACKAGES},
+            "versions": {name: version(name) for name in PACKAGES},
         }
     )
 

@@ -73,6 +73,23 @@ def stretched(phases: tuple[Phase, ...], duration_s: float) -> tuple[Phase, ...]
 
 
 @dataclass(frozen=True)
+class Robustness:
+    """What a grip is to bear.
+
+    Attributes:
+        uncertainty: The worlds that it serves, with the true friction.
+        preload: Least normal force of the hands [N], against pushes that no grip alone withstands:
+            stiff hands and their friction do.
+    """
+
+    uncertainty: UncertaintySet
+    preload: float
+
+    def __post_init__(self) -> None:
+        not_negative("robustness.preload", self.preload)
+
+
+@dataclass(frozen=True)
 class Control:
     """How forces are synthesised and followed.
 
@@ -87,8 +104,8 @@ class Control:
         solve_every: Physics steps per synthesis.
         bandwidth: Natural frequency of the joint impedance, which is critically damped [rad/s].
         yielding_squeeze: Whether the impedance leaves the hands' squeeze to the feed-forward.
-        uncertainty: What the grip has to bear beyond the belief, with the true friction; None for
-            the fixed margins of ``friction_factor`` and ``preload`` alone.
+        robustness: What the grip has to bear beyond the belief; None for the fixed margins of
+            ``friction_factor`` and ``preload`` alone.
         pose_filter_s: Time constant with which the object's measured pose is smoothed [s].
     """
 
@@ -100,7 +117,7 @@ class Control:
     solve_every: int = 4
     bandwidth: float = 30.0
     yielding_squeeze: bool = False
-    uncertainty: UncertaintySet | None = None
+    robustness: Robustness | None = None
     pose_filter_s: float = 0.0
 
     def __post_init__(self) -> None:
@@ -111,8 +128,10 @@ class Control:
         whole("control.solve_every", self.solve_every, least=1)
 
 
-# What the robust controller's grip bears.
-_BORNE = UncertaintySet(mass=0.25, center=(0.025,) * 3, friction=0.25, placement=0.005)
+_ROBUSTNESS = Robustness(
+    UncertaintySet(mass=0.2, center=(0.02, 0.02, 0.02), friction=0.2, placement=0.005),
+    preload=52.0,
+)
 
 
 def controllers(control: Control) -> dict[str, Control]:
@@ -126,9 +145,8 @@ def controllers(control: Control) -> dict[str, Control]:
     return {
         "robust": replace(
             control,
-            preload=max(control.preload, 25.0),
-            uncertainty=_BORNE,
-            bandwidth=100.0,
+            robustness=_ROBUSTNESS,
+            bandwidth=150.0,
             yielding_squeeze=True,
             pose_filter_s=0.05,
         ),

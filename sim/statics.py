@@ -2,17 +2,15 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import mujoco
 import numpy as np
 
 from sim.contacts import ContactFrames, contacts
-from sim.grip import GripSchedule
+from sim.grip import GripSchedule, pressed
 from sim.robot import RobotModel
 from sim.scenario import GRAVITY, Scenario
 from sim.settings import Control
-from synthesis import Contact, Problem
+from synthesis import Problem
 from synthesis.contact import Array, skew
 
 # Contacts are made once for each of these steps, over which the least grip changes by 0.2 N [deg].
@@ -43,7 +41,7 @@ class Statics:
         self._contacts = [nominal]
         if grip is not None:
             tilts = np.linspace(0.0, end, round(np.degrees(end) / _GRIP_STEP_DEG) + 1)
-            self._contacts = [_pressed(nominal, f_n) for f_n in grip.at(tilts)]
+            self._contacts = [pressed(nominal, f_n) for f_n in grip.at(tilts)]
         self._rows_per_rad = (len(self._contacts) - 1) / end
         self._frames = ContactFrames(scenario)
         self._hands = len(scenario.hands)
@@ -74,12 +72,3 @@ class Statics:
             joints=None if self._robot is None else self._robot.statics(p_WC[:n], R_WO @ R_OC[:n]),
             objective=self._objective,
         )
-
-
-def _pressed(nominal: tuple[Contact, ...], f_n: Array) -> tuple[Contact, ...]:
-    """The contacts, hands first, with these least normal forces of the hands [N], (n,)."""
-    hands = (
-        replace(contact, f_n_min=min(float(force), contact.f_n_max))
-        for contact, force in zip(nominal, f_n, strict=False)
-    )
-    return (*hands, *nominal[len(f_n) :])

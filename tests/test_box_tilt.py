@@ -74,9 +74,10 @@ def test_without_preload_the_hands_let_go_where_the_box_balances():
         assert run(BOX, "default").history.kept[rows, hand].all()
 
 
-def test_three_seconds_are_too_fast_for_quasi_static_forces():
+def test_three_and_a_half_seconds_are_too_fast_for_quasi_static_forces():
     # The forces know no inertia: as the tilt speeds up, the box is lifted off its edge. The arms
-    # still carry it to the end, so that only the contact monitor tells.
+    # still carry it to the end, so that only the contact monitor tells (in 3 s the tilt is off by
+    # 0.21 deg, too). In 5 s the edge stays, in 6 s all requirements are met.
     report, trace, history = run(BOX, "hasty")
     assert report.verdict is Verdict.FAIL
     lost = np.flatnonzero(settled(BOX, trace) & ~history.kept.all(axis=1))

@@ -15,7 +15,19 @@ from synthesis import Objective
 
 ROOT = Path(__file__).parent.parent
 # Packages that take long to import; what `fulcrum --help` needs of the house has only arrays.
-HEAVY = ("mujoco", "dm_control", "mink", "pinocchio", "rerun", "cvxpy", "trimesh", "sim", "rich")
+HEAVY = (
+    "mujoco",
+    "distributed",
+    "pyarrow",
+    "dm_control",
+    "mink",
+    "pinocchio",
+    "rerun",
+    "cvxpy",
+    "trimesh",
+    "sim",
+    "rich",
+)
 
 BAD = {
     "no command": "",

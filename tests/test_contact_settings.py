@@ -8,7 +8,7 @@ from sim.report import Verdict
 from synthesis.contact import N
 from tests.runs import BOX, NAMES, run, settled
 
-# The bar of 2 % of the peak of the commanded force, per contact. Measured: RMS 0.31 % and 0.18 %.
+# The bar of 2 % of the peak of the commanded force, per contact. Measured: RMS 0.24 % and 0.17 %.
 SAME_FORCE = 0.02
 
 
@@ -39,22 +39,32 @@ def test_other_contact_settings_give_the_same_verdict_and_rms_forces(name, case)
 
 @pytest.mark.parametrize("name", NAMES)
 def test_softer_contacts_carry_the_same_force_at_every_step(name):
-    # Measured 1.57 % at the edges, 0.47 % at the hands.
+    # Measured 1.70 % at the edges, 0.45 % at the hands.
     shift, rows = force_shift(name, run(name, "default"), run(name, "softer"))
     assert np.abs(shift[rows]).max() < SAME_FORCE
+
+
+def role_shift(name, case):
+    """Largest difference of forces by role from the default, over their peaks, (2,).
+
+    When the far side of a face comes down, the edge hands over part of its load within a step.
+    Which step that is differs by one: each force is compared with the nearest of three steps.
+    """
+    default, other = by_role(name, run(name, "default")), by_role(name, run(name, case))
+    near = np.stack([np.roll(other, lag, axis=0) for lag in (-1, 0, 1)])
+    rows = settled(name, run(name, "default").trace)
+    return np.abs(near - default).min(axis=0)[rows].max(axis=0) / default[rows].max(axis=0)
 
 
 @pytest.mark.parametrize("name", NAMES)
 def test_contacts_without_noslip_carry_the_same_force_by_role_at_every_step(name):
     # How neighbouring points of a rigid edge share their load is left to a slow roll of the object
-    # that hardly any force resists: single points differ by 3.3 % (box), their sum does not.
-    default, other = (by_role(name, run(name, case)) for case in ("default", "without noslip"))
-    rows = settled(name, run(name, "default").trace)
-    shift = (other - default)[rows] / default[rows].max(axis=0)
-    assert np.abs(shift).max() < SAME_FORCE
+    # that hardly any force resists: single points differ by 3.5 % (box), their sum by 0.12 %.
+    assert role_shift(name, "without noslip").max() < SAME_FORCE
 
 
 def test_a_slippery_truth_is_no_such_small_change_of_forces():
     shift, rows = force_shift(BOX, run(BOX, "default"), run(BOX, "slippery"))
     assert np.sqrt(np.mean(shift**2, axis=0)).max() > SAME_FORCE
     assert np.abs(shift[rows]).max() > SAME_FORCE
+    assert role_shift(BOX, "slippery").max() > SAME_FORCE

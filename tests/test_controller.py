@@ -198,7 +198,12 @@ def test_it_holds_the_last_forces_and_says_so_when_there_is_no_solution():
     # It recovers as soon as there is one.
     again = it.command(measured(80.0, GRIPPED_S))
     assert not again.failed
-    np.testing.assert_allclose(again.w_OC_C[:, N], upright.w_OC_C[:, N], rtol=0, atol=1e-6)
+    # The grip, which is minimised, to the solver's 1e-9 of 60 N. The edge bears what the hands'
+    # friction does not, and that moves along the curve of the cone by the root of a change of grip:
+    # sqrt(1e-9) of 60 N is 2e-3 N; measured 1.1e-6.
+    difference = again.w_OC_C[:, N] - upright.w_OC_C[:, N]
+    np.testing.assert_allclose(difference[:2], 0.0, rtol=0, atol=1e-7)
+    np.testing.assert_allclose(difference[2:], 0.0, rtol=0, atol=1e-5)
     # What the edge's ends push against each other is free, and depends on what was solved before.
     np.testing.assert_allclose(again.w_OC_C, upright.w_OC_C, rtol=0, atol=1e-3)
 
@@ -293,6 +298,9 @@ def test_controllers_keep_the_rest_of_a_scenario_s_control():
         ("preload", np.nan),
         ("bandwidth", -1.0),
         ("bandwidth", np.nan),
+        ("pose_filter_s", -0.01),
+        ("pose_filter_s", np.inf),
+        ("pose_filter_s", np.nan),
         ("solve_every", 0),
         ("solve_every", -4),
         ("solve_every", 4.0),

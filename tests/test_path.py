@@ -99,6 +99,28 @@ def test_axis_points_only_advance_by_the_pitch(pivot, tilt, along):
 
 
 @exhaustive
+@given(pivots, vectors, tilts)
+def test_axis_points_move_by_the_advance_per_radian(pivot, travel, tilt):
+    path = ScrewPath(replace(pivot, travel=travel))
+    R_0, p_0 = path.pose(0.0)
+    R, p = path.pose(tilt)
+    moved = R @ R_0.T @ (path.point - p_0) + p
+    # Travels of 1 m in 90 deg are advances of less than 2 m/rad: twice the rounding.
+    np.testing.assert_allclose(moved - path.point, tilt * path.advance, rtol=0, atol=2.0 * ROUNDING)
+    # At the end the whole travel has been added to the pitch.
+    whole = pivot.pitch * path.end * path.axis + np.array(travel)
+    np.testing.assert_allclose(path.end * path.advance, whole, rtol=0, atol=ROUNDING)
+
+
+def test_an_advance_without_the_travel_is_caught():
+    lifted = ScrewPath(replace(scenario("box-tilt").path, pitch=0.1, travel=(0.0, 0.0, 0.001)))
+    R_0, p_0 = lifted.pose(0.0)
+    R, p = lifted.pose(lifted.end)
+    moved = R @ R_0.T @ (lifted.point - p_0) + p
+    assert np.abs(moved - lifted.point - lifted.end * 0.1 * lifted.axis).max() > 9e-4
+
+
+@exhaustive
 @given(pivots, tilts)
 def test_a_point_off_the_axis_moves_by_the_chord(pivot, tilt):
     path = ScrewPath(replace(pivot, pitch=0.0))

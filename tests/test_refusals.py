@@ -261,10 +261,10 @@ def test_a_run_is_never_written_over_another(tmp_path):
 
 
 def test_a_run_off_the_main_thread_runs():
-    short = replace(BOX, phases=stretched(BOX.phases, 6.0))
+    short = replace(BOX, phases=stretched(BOX.phases, 5.0))
     with ThreadPoolExecutor(1) as pool:
         report = pool.submit(execute, Request(short, "margin", short.control)).result().report
-    # A 6 s tilt slides by 0.12 mm: it ran, and was judged.
+    # A 5 s tilt slides by 0.12 mm: it ran, and was judged.
     assert any("slid" in failure for failure in report.failures)
 
 

@@ -1,0 +1,132 @@
+"""What a sweep is: which episodes there are, and the command that replays each of them."""
+
+from __future__ import annotations
+
+import dataclasses
+import itertools
+import math
+from dataclasses import dataclass
+from importlib.metadata import version
+from typing import Any
+
+from sim.checks import whole
+from sim.files import finite
+from sim.run import PACKAGES
+from sim.scenario import Scenario
+from sim.settings import controllers
+from sim.sweep.criteria import Criteria
+from sim.sweep.parameters import Grid, overridden
+from sim.uncertainty import draw, preset
+from sim.world import World
+from synthesis import InvalidInputError
+
+# More take days, and a task each in memory.
+_MOST = 100_000
+
+
+@dataclass(frozen=True)
+class Episode:
+    """One controller in one world.
+
+    Attributes:
+        number: Of the world within the sweep: all controllers meet the same ones.
+        controller: Name.
+        seed: Draws world and start posture.
+        values: What the grid sets of the world, by parameter.
+    """
+
+    number: int
+    controller: str
+    seed: int
+    values: tuple[tuple[str, float], ...] = ()
+
+    @property
+    def name(self) -> str:
+        """Unique in the sweep; fit for a file."""
+        return f"{self.number:07d}-{self.controller}"
+
+
+@dataclass(frozen=True)
+class Sweep:
+    """Every controller in every world.
+
+    Attributes:
+        scenario: The scene, as the controllers believe it to be.
+        controllers: Names.
+        preset: Name of the uncertainty that worlds are drawn from.
+        episodes: Per controller and point of the grid.
+        seed: Of the first; the next have the next.
+        grid: What is set of the drawn worlds.
+        criteria: What counts as success.
+    """
+
+    scenario: Scenario
+    controllers: tuple[str, ...]
+    preset: str
+    episodes: int
+    seed: int = 0
+    grid: Grid = ()
+    criteria: Criteria = Criteria()
+
+    def __post_init__(self) -> None:
+        known = controllers(self.scenario.control)
+        valid = f"one or more of {', '.join(known)}, each once"
+        once = len(set(self.controllers)) == len(self.controllers)
+        if not (self.controllers and once and set(self.controllers) <= set(known)):
+            raise InvalidInputError("controllers", ",".join(self.controllers), valid)
+        whole("episodes", self.episodes, least=1)
+        whole("seed", self.seed, least=0)
+        worlds = self.episodes * math.prod(len(values) for _, values in self.grid)
+        if worlds * len(self.controllers) > _MOST:
+            valid = f"at most {_MOST} in all, over grid and controllers"
+            raise InvalidInputError("episodes", self.episodes, valid)
+        drawn = draw(preset(self.preset), self.scenario, self.seed)
+        for name, values in self.grid:
+            for value in values:
+                overridden(drawn, self.scenario, {name: value}).truth(self.scenario)
+
+    def all_episodes(self) -> list[Episode]:
+        """Every episode, world after world, so that controllers can be compared early on."""
+        points = [[(name, value) for value in values] for name, values in self.grid]
+        worlds = itertools.product(range(self.episodes), itertools.product(*points))
+        return [
+            Episode(number, controller, self.seed + i, values)
+            for number, (i, values) in enumerate(worlds)
+            for controller in self.controllers
+        ]
+
+    def world(self, episode: Episode) -> World:
+        """The truth of an episode."""
+        worlds = self.episodes * math.prod(len(values) for _, values in self.grid)
+        if worlds * len(self.controllers) > _MOST:
+            valid = f"at most {_MOST} in all, over grid and controllers"
+            raise InvalidInputError("episodes", self.episodes, valid)
+        drawn = draw(preset(self.preset), self.scenario, episode.seed)
+        return overridden(drawn, self.scenario, dict(episode.values))
+
+    def replay(self, episode: Episode) -> str:
+        """The command that runs an episode again, with a recording."""
+        words = [
+            f"fulcrum run {self.scenario.name} --controller {episode.controller}",
+            f"--preset {self.preset} --seed {episode.seed}",
+        ]
+        if episode.values:
+            words.append("--world " + ",".join(f"{n}={v!r}" for n, v in episode.values))
+        return " ".join(words)
+
+    def config(self) -> dict[str, Any]:
+        """All that determines the episodes, for JSON."""
+        known = controllers(self.scenario.control)
+        return finite(
+            {
+                "scenario": dataclasses.asdict(self.scenario),
+                "controllers": {n: dataclasses.asdict(known[n]) for n in self.controllers},
+                "preset": self.preset,
+                "uncertainty": dataclasses.asdict(preset(self.preset)),
+                "episodes": self.episodes,
+                "seed": self.seed,
+                "grid": {name: list(values) for name, values in self.grid},
+                "criteria": dataclasses.asdict(self.criteria),
+                "versions": {name: version(name) for name in PACKAGES},
+            }
+        )

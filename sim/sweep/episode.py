@@ -1,0 +1,166 @@
+"""One episode as a flat row: what was true, what was measured, and what a failure began with."""
+
+from __future__ import annotations
+
+import dataclasses
+import pickle
+import time
+from collections.abc import Mapping, Sequence
+from functools import lru_cache
+from typing import Any
+
+from sim.files import finite
+from sim.ik import JointPath, plan_joints
+from sim.robot import RobotModel
+from sim.run import Request, Result, execute, holdable_path
+from sim.scenario import Scenario
+from sim.settings import Control, controllers
+from sim.sweep.criteria import stretches, violations
+from sim.sweep.design import Episode, Sweep
+from sim.sweep.parameters import PARAMETERS
+from sim.world import World
+
+Row = dict[str, Any]
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class Prepared:
+    """What all episodes of a sweep share, and what takes time: found once per process.
+
+    Attributes:
+        sweep: The sweep.
+        controls: Settings by controller.
+        joint_path: How the arms follow the object's path, which the truth does not change.
+        joints: Names of the robot's joints.
+    """
+
+    sweep: Sweep
+    controls: dict[str, Control]
+    joint_path: JointPath
+    joints: tuple[str, ...]
+
+
+@lru_cache(maxsize=4)
+def prepared(packed: bytes) -> Prepared:
+    """The shared parts of a pickled sweep.
+
+    Raises:
+        PathError: The arms cannot follow the path.
+    """
+    sweep: Sweep = pickle.loads(packed)
+    known = controllers(sweep.scenario.control)
+    return Prepared(
+        sweep=sweep,
+        controls={name: known[name] for name in sweep.controllers},
+        joint_path=plan_joints(sweep.scenario),
+        joints=RobotModel(sweep.scenario).joints,
+    )
+
+
+def check_holdable(sweep: Sweep) -> None:
+    """Refuses a sweep whose own scenario, without deviations, cannot be done.
+
+    Raises:
+        PathError: The arms cannot follow the path.
+        UnholdableError: A controller finds no forces somewhere on the path.
+    """
+    known = controllers(sweep.scenario.control)
+    for name in sweep.controllers:
+        if known[name].feedforward:
+            holdable_path(sweep.scenario, known[name])
+        else:
+            plan_joints(sweep.scenario)
+
+
+def run_episode(packed: bytes, episode: Episode) -> Row:
+    """Runs an episode of a pickled sweep without a recording.
+
+    A column's name is the path to its figure: ``world.`` is what was true, all else but the first
+    few as in a run's report.
+    """
+    shared = prepared(packed)
+    sweep = shared.sweep
+    started, computed = time.perf_counter(), time.thread_time()
+    control = shared.controls[episode.controller]
+    world = sweep.world(episode)
+    row: Row = {
+        "episode": episode.number,
+        "controller": episode.controller,
+        "seed": episode.seed,
+        "success": False,
+        "cause": None,
+        "category": None,
+        "failed_at_s": None,
+        "error": None,
+        "replay": sweep.replay(episode),
+        **_truths(world, sweep.scenario, shared.joints),
+    }
+    request = Request(sweep.scenario, episode.controller, control, episode.seed, world=world)
+    try:
+        result = execute(request, joint_path=shared.joint_path)
+    except Exception as error:  # whatever ends an episode is its failure, not the sweep's
+        text = f"{type(error).__name__}: {error}"
+        row |= {"cause": "error", "category": "error", "failed_at_s": 0.0, "error": text}
+    else:
+        row |= outcome(shared, result)
+    row["wall_s"] = time.perf_counter() - started
+    row["cpu_s"] = time.thread_time() - computed
+    return finite(row)
+
+
+def outcome(shared: Prepared, result: Result) -> Row:
+    """A run's figures, and whether it kept to the criteria."""
+    scenario, trace = shared.sweep.scenario, result.trace
+    report = dataclasses.asdict(result.report)
+    for whole_run in ("scenario", "controller", "seed", "recording", "phases"):
+        report.pop(whole_run)
+    report["failures"] = " ".join(report["failures"])
+    found = violations(shared.sweep.criteria, scenario, shared.joints, result)
+    longest = [int(stretches(trace.saturated[:, i]).max()) for i in range(len(shared.joints))]
+    worst = max(range(len(longest)), key=longest.__getitem__)
+    return {
+        "success": not found,
+        "cause": found[0].text if found else None,
+        "category": found[0].category if found else None,
+        "failed_at_s": found[0].t if found else None,
+        "error": result.error,
+        **_flat("", report),
+        **{
+            f"contacts.{name}.held_slip_mm": 1e3 * float(result.history.slip[:, i].max())
+            for i, name in enumerate(scenario.contact_names)
+        },
+        "torque.longest_saturated_s": longest[worst] * scenario.physics.timestep,
+        "torque.longest_saturated_joint": shared.joints[worst] if longest[worst] else None,
+    }
+
+
+def _truths(world: World, scenario: Scenario, joints: tuple[str, ...]) -> Row:
+    """Every number of a world, by contact, hand or joint, and those that grids and maps know."""
+    names: dict[str, Sequence[str]] = {
+        "friction": scenario.contact_names,
+        "hand_place": tuple(hand.name for hand in scenario.hands),
+        **dict.fromkeys(("link_mass", "joint_friction", "torque_gain", "torque_offset"), joints),
+    }
+    truths = {
+        key: dict(zip(names[key], value, strict=False)) if key in names else value
+        for key, value in dataclasses.asdict(world).items()
+    }
+    known = {f"world.{n}": p.read(world, scenario) for n, p in PARAMETERS.items()}
+    return {**known, **_flat("world.", truths)}
+
+
+def _flat(prefix: str, values: Mapping[str, Any]) -> Row:
+    """Nested values as one level of names with dots."""
+    row: Row = {}
+    for key, value in values.items():
+        if isinstance(value, (list, tuple)):
+            axes = "xyz" if len(value) == 3 else "to" if len(value) == 2 else ""
+            if not all(isinstance(item, float) for item in value):
+                axes = ""
+            labels = axes or map(str, range(len(value)))
+            row |= _flat(f"{prefix}{key}.", dict(zip(labels, value, strict=True)))
+        elif isinstance(value, Mapping):
+            row |= _flat(f"{prefix}{key}.", value)
+        else:
+            row[f"{prefix}{key}"] = value
+    return row

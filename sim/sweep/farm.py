@@ -1,0 +1,153 @@
+"""Episodes on many processes: a Dask cluster runs them, and each is kept as it finishes."""
+
+from __future__ import annotations
+
+import contextlib
+import logging
+import os
+import pickle
+import uuid
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+
+import dask
+import pyarrow as pa
+from distributed import Client, KilledWorker, LocalCluster, as_completed
+from distributed.comm.core import CommClosedError
+
+from sim.checks import whole
+from sim.sweep.design import Sweep
+from sim.sweep.episode import check_holdable, run_episode
+from sim.sweep.store import Store
+from synthesis import FulcrumError, InvalidInputError
+
+# How long a scheduler may take to answer, and its first worker to come [s].
+_PATIENCE_S = 10
+_SETTINGS = {
+    # What workers have to say the driver says, or writes into rows.
+    "distributed.nanny.pre-spawn-environ.DASK_LOGGING__DISTRIBUTED": "critical",
+    # Nobody reads Dask's profile, which it takes a hundred times a second in every process.
+    "distributed.worker.profile.enabled": False,
+}
+
+# Called with episodes finished, episodes in total and failures so far.
+Progress = Callable[[int, int, int], None]
+
+
+@dataclass(frozen=True)
+class Workers:
+    """Who runs the episodes.
+
+    Attributes:
+        count: Of processes on this machine; one for each of its processors if left out.
+        scheduler: Address of a running Dask cluster instead, whose workers have fulcrum installed.
+    """
+
+    count: int | None = None
+    scheduler: str | None = None
+
+    def __post_init__(self) -> None:
+        if self.count is not None:
+            whole("--workers", self.count, least=1)
+        if self.count is not None and self.scheduler is not None:
+            valid = "none beside --scheduler, whose cluster has its own"
+            raise InvalidInputError("--workers", self.count, valid)
+
+
+class LostEpisodesError(FulcrumError):
+    """Some episodes took every worker down that tried them; the others are finished."""
+
+    def __init__(self, names: list[str]) -> None:
+        self.names = names
+        super().__init__(
+            f"{len(names)} episodes are missing, because each killed several workers "
+            f"(the first is {names[0]}); the same command tries them again."
+        )
+
+
+def run_sweep(
+    sweep: Sweep, store: Store, workers: Workers, progress: Progress | None = None
+) -> pa.Table:
+    """Runs the episodes that are missing; returns all, one row each.
+
+    Dask gives the episodes of a worker that dies to another one. What has been written survives
+    whatever happens to this process: another call with the same folder goes on from there.
+
+    Raises:
+        PathError: The arms cannot follow the path; nothing has been run.
+        UnholdableError: A controller finds no forces somewhere on the path; nothing has been run.
+        InvalidInputError: No cluster answers at the address.
+        LostEpisodesError: Some episodes killed all workers that tried them.
+        KeyboardInterrupt: Somebody pressed Ctrl-C.
+    """
+    missing = store.missing()
+    if not missing:
+        return store.merge()
+    check_holdable(sweep)
+    done, failures = _finished(store)
+    total = done + len(missing)
+    lost = []
+    report = progress or (lambda done, total, failures: None)
+    report(done, total, failures)
+    with _cluster(workers) as client:
+        store.begin()
+        packed = pickle.dumps(sweep)  # small, and sent along: what is scattered dies with workers
+        mark = uuid.uuid4().hex  # a shared cluster knows tasks of others
+        tasks = {
+            client.submit(run_episode, packed, e, key=f"{e.name}-{mark}", pure=False): e
+            for e in missing
+        }
+        for task in as_completed(tasks):
+            episode = tasks.pop(task)
+            try:
+                row = task.result()
+            except KilledWorker:
+                lost.append(episode.name)
+                continue
+            except ImportError as error:
+                valid = "a cluster whose workers have this fulcrum installed"
+                raise InvalidInputError("--scheduler", f"{error}", valid) from None
+            store.write(episode, row)  # before it counts as finished
+            done, failures = done + 1, failures + (not row["success"])
+            report(done, total, failures)
+    if lost:
+        raise LostEpisodesError(lost)
+    return store.merge()
+
+
+def _finished(store: Store) -> tuple[int, int]:
+    table = store.read()
+    if not len(table):
+        return 0, 0
+    success = table["success"].to_pylist()
+    return len(success), success.count(False)
+
+
+@contextlib.contextmanager
+def _cluster(workers: Workers) -> Iterator[Client]:
+    """A client of the cluster; one of its own processes ends with it."""
+    with contextlib.ExitStack() as stack:
+        if workers.scheduler is None:
+            logging.getLogger("distributed").setLevel(logging.CRITICAL)
+            stack.enter_context(dask.config.set(_SETTINGS))
+            address = stack.enter_context(
+                LocalCluster(
+                    n_workers=workers.count or os.cpu_count() or 1,
+                    threads_per_worker=1,
+                    processes=True,
+                    dashboard_address="127.0.0.1:0",  # only for its own use; there is no dashboard
+                    silence_logs=logging.CRITICAL,
+                    preload="sim.sweep.quiet",
+                )
+            )
+        else:
+            address = workers.scheduler
+        valid = "the address of a running Dask scheduler with workers, like tcp://host:8786"
+        try:
+            client = stack.enter_context(Client(address, timeout=_PATIENCE_S))
+            client.wait_for_workers(1, timeout=_PATIENCE_S)
+        except (OSError, ValueError, CommClosedError) as error:
+            raise InvalidInputError(
+                "--scheduler", f"{workers.scheduler} ({error})", valid
+            ) from None
+        yield client
