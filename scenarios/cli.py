@@ -24,6 +24,7 @@ from scenarios.common import (
     results_folder,
 )
 from scenarios.paper.command import Reproduce
+from scenarios.planning import Plan
 from scenarios.sweep import Sweep
 
 if TYPE_CHECKING:
@@ -186,6 +187,7 @@ Command = (
     | Annotated[View, tyro.conf.subcommand("view")]
     | Annotated[Explain, tyro.conf.subcommand("explain")]
     | Annotated[Capacity, tyro.conf.subcommand("capacity")]
+    | Annotated[Plan, tyro.conf.subcommand("plan")]
     | Annotated[Reproduce, tyro.conf.subcommand("reproduce")]
     | Annotated[Sweep, tyro.conf.subcommand("sweep")]
 )
@@ -212,7 +214,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 def _parse(
     arguments: Sequence[str] | None,
-) -> List | Run | Screenshot | View | Explain | Capacity | Reproduce | Sweep:
+) -> List | Run | Screenshot | View | Explain | Capacity | Plan | Reproduce | Sweep:
     """The command asked for; a parse error leaves as one line instead of tyro's box."""
     errors = io.StringIO()
     try:

@@ -99,13 +99,17 @@ class JointPath:
         raise InvalidInputError("tilt", given, f"between 0 and {np.degrees(end):g} deg")
 
 
-def plan_joints(scenario: Scenario) -> JointPath:
+def plan_joints(scenario: Scenario, solved: float = _SOLVED) -> JointPath:
     """Follows the manoeuvre with all hands, within joint, speed and collision limits.
+
+    Args:
+        scenario: The scene.
+        solved: Pose error at which a step counts as solved [m and rad].
 
     Raises:
         PathError: A limit stops the arms; names it and the tilt.
     """
-    return _Follower(scenario).follow()
+    return _Follower(scenario, solved).follow()
 
 
 class _Target(NamedTuple):
@@ -114,8 +118,9 @@ class _Target(NamedTuple):
 
 
 class _Follower:
-    def __init__(self, scenario: Scenario) -> None:
+    def __init__(self, scenario: Scenario, solved: float) -> None:
         self._scenario, self._path = scenario, ScrewPath(scenario.path)
+        self._solved = solved
         self._schedule = Schedule(scenario)
         self._frames = ContactFrames(scenario)
         spec = compose(scenario, ObjectMotion.POSED)
@@ -202,7 +207,7 @@ class _Follower:
         ]
         start = self._configuration.q.copy()
         for _ in range(_ITERATIONS):
-            if self._error() < _SOLVED:
+            if self._error() < self._solved:
                 break
             try:
                 tasks = [*self._tasks, self._damping]
@@ -216,7 +221,7 @@ class _Follower:
         too_fast = np.zeros(len(moved), bool)
         if duration is not None:
             too_fast = moved >= (1.0 - _AT_LIMIT) * duration * self._qd_max
-        if not self._error() < _SOLVED or too_fast.any():  # a NaN is no solution
+        if not self._error() < self._solved or too_fast.any():  # a NaN is no solution
             raise PathError(target.tilt, target.gap, self._error(), self._reasons(too_fast))
 
     def _tip_poses(self, target: _Target) -> list[mink.SE3]:

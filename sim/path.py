@@ -57,6 +57,18 @@ class ScrewPath:
         p_WO = self.point + turn.apply(self._p_WO - self.point) + tilt * self.advance
         return (turn * self._R_WO).as_matrix(), p_WO
 
+    def derivatives(self, tilt: float, p_O: Array) -> tuple[Array, Array]:
+        """First and second derivatives by tilt [m/rad, m/rad^2], (3,) each, of a point's place.
+
+        Args:
+            tilt: [rad].
+            p_O: The point in the object frame [m], (3,).
+        """
+        R_WO, p_WO = self.pose(tilt)
+        arm = p_WO + R_WO @ p_O - tilt * self.advance - self.point
+        turning = np.cross(self.axis, arm)
+        return turning + self.advance, np.cross(self.axis, turning)
+
     def tilt(self, quaternion: Array) -> Array:
         """Tilt [rad] of measured orientations, (..., 4) wxyz: their twist about the axis.
 

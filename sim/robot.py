@@ -85,6 +85,25 @@ class RobotModel:
         """Joint-space inertia [kg m^2 or kg], (l, l)."""
         return pin.crba(self._model, self._data, self._q).take(self._mass_entries)
 
+    def inertial_torques(self, slope: Array, curvature: Array) -> tuple[Array, Array]:
+        r"""What motion along joint angles q(s) costs, at the last updated angles.
+
+        Args:
+            slope: q' [rad or m], (l,).
+            curvature: q'', (l,).
+
+        Returns:
+            :math:`M q'` and :math:`M q'' + C(q, q') q'`, (l,) each: torques per :math:`\ddot s` and
+            per :math:`\dot s^2`, without viscous friction.
+        """
+        still, q1, q2 = np.zeros((3, self._model.nv))
+        q1[self._order], q2[self._order] = slope, curvature
+        # A copy of the data, whose own stays that of the last update.
+        data, tau_g = self._model.createData(), self._tau_g
+        per_a = pin.rnea(self._model, data, self._q, still, q1).take(self._order) - tau_g
+        per_b = pin.rnea(self._model, data, self._q, q1, q2).take(self._order) - tau_g
+        return per_a, per_b
+
     def contact_jacobians(self, p_WC: Array, R_WC: Array) -> Array:
         """Jacobians of the hands' points at the contacts, in contact axes.
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
@@ -65,3 +66,19 @@ class SolverError(FulcrumError):
     def __init__(self, status: str) -> None:
         self.status = status
         super().__init__(f"the conic solver stopped with status {status}; valid is Solved.")
+
+
+class InfeasiblePathError(FulcrumError):
+    """No timing and forces satisfy all constraints along the path.
+
+    Attributes:
+        binding: The limits that weigh most in the proof, each with its place s on the path.
+    """
+
+    def __init__(self, binding: list[tuple[str, float]]) -> None:
+        self.binding = binding
+        named = [name if math.isnan(s) else f"{name} at s = {s:.4g}" for name, s in binding]
+        super().__init__(
+            "no timing and forces along the path keep all limits; "
+            f"most binding: {', '.join(named)}."
+        )

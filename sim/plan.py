@@ -1,0 +1,198 @@
+"""A planned tilt: the fastest, easiest or safest timing of a scenario's path, and the forces."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import NamedTuple
+
+import numpy as np
+from scipy.interpolate import BSpline
+
+from sim.checks import positive
+from sim.plan_problem import CERTAIN, Margins, path_problem
+from sim.scenario import Scenario
+from synthesis import FulcrumError, InvalidInputError
+from synthesis.contact import Array
+from synthesis.errors import InfeasiblePathError
+from synthesis.path_problem import PathObjective, PathProblem
+from synthesis.path_solution import PathSolution
+from synthesis.path_synthesizer import solve_path
+from synthesis.uncertainty_set import UncertaintySet
+
+# What the solver's accuracy may add to a limit that a plan uses up, as a share of it [-].
+_EXCESS = 1e-6
+
+
+class PlanError(FulcrumError):
+    """No timing of the tilt keeps all limits; names those that weigh most, and at which tilt."""
+
+    def __init__(self, scenario: str, what: str, binding: list[tuple[str, float]]) -> None:
+        self.binding = binding
+        named = [
+            name if math.isnan(tilt) else f"{name} at {tilt:.1f} deg" for name, tilt in binding
+        ]
+        super().__init__(f"{scenario}: {what} breaks a limit; most binding: {', '.join(named)}.")
+
+
+class Moment(NamedTuple):
+    """A plan at one instant.
+
+    Attributes:
+        tilt, rate, acceleration: [rad, rad/s, rad/s^2].
+        q, qd, qdd: Joint angles, speeds and accelerations [rad or m, per s, per s^2], (l,).
+        w_OC_C: Wrenches on the object in contact axes [N, N·m], (m, 6).
+        tau: Joint torques [N·m or N], (l,).
+    """
+
+    tilt: float
+    rate: float
+    acceleration: float
+    q: Array
+    qd: Array
+    qdd: Array
+    w_OC_C: Array
+    tau: Array
+
+
+@dataclass(frozen=True, eq=False)
+class Plan:
+    """Timing, joint motion and forces of a tilt, from rest to rest.
+
+    Attributes:
+        scenario: What is tilted.
+        margins: What it keeps clear of.
+        joints: Names of the joints.
+        solution: Timing and forces; its path coordinate is the share of the tilt.
+        q: Joint angles over that share.
+    """
+
+    scenario: Scenario
+    margins: Margins
+    joints: tuple[str, ...]
+    solution: PathSolution
+    q: BSpline
+
+    @cached_property
+    def tilt(self) -> Array:
+        """Tilt at the grid points [rad], (K,)."""
+        return self.solution.problem.s * math.radians(self.scenario.path.angle_deg)
+
+    @property
+    def times(self) -> Array:
+        """When the grid points are reached [s], (K,)."""
+        return self.solution.times
+
+    @property
+    def duration(self) -> float:
+        """Of the tilt [s]."""
+        return self.solution.duration
+
+    @property
+    def peak_rate(self) -> float:
+        """The fastest that it turns [rad/s]."""
+        return math.sqrt(self.solution.b.max()) * math.radians(self.scenario.path.angle_deg)
+
+    def at(self, t: float) -> Moment:
+        """The plan at a time [s]; before its start and after its end at rest there.
+
+        The timing is exact; forces and torques are linear in the tilt between grid points.
+        """
+        found = self.solution
+        s = found.problem.s
+        k = int(np.clip(np.searchsorted(self.times, t, side="right") - 1, 0, len(s) - 2))
+        elapsed = min(max(t - self.times[k], 0.0), self.times[k + 1] - self.times[k])
+        start = math.sqrt(found.b[k])
+        a, moving = float(found.a[k]), 0.0 <= t <= self.duration
+        share = s[k] + elapsed * (start + a * elapsed / 2.0)
+        rate = (start + a * elapsed) if moving else 0.0
+        a = a if moving else 0.0
+        part = float(np.clip((share - s[k]) / (s[k + 1] - s[k]), 0.0, 1.0))
+        w, tau = found.w_OC_C[0][2 * k : 2 * k + 2], found.tau[0][2 * k : 2 * k + 2]
+        end = math.radians(self.scenario.path.angle_deg)
+        slope, curvature = self.q(share, 1), self.q(share, 2)
+        return Moment(
+            tilt=share * end,
+            rate=rate * end,
+            acceleration=a * end,
+            q=self.q(share),
+            qd=slope * rate,
+            qdd=slope * a + curvature * rate**2,
+            w_OC_C=w[0] + part * (w[1] - w[0]),
+            tau=tau[0] + part * (tau[1] - tau[0]),
+        )
+
+    def stretched(
+        self, factor: float, objective: PathObjective = PathObjective.FRICTION_MARGIN
+    ) -> Plan:
+        """The same motion in ``factor`` times the duration, with forces of its own.
+
+        Args:
+            factor: > 0; below 1 the motion is faster.
+            objective: What the forces are best for.
+
+        Raises:
+            PlanError: There are none, as where statics has none and only speed helps; says where.
+        """
+        positive("stretch", factor)
+        what = f"a tilt in {self.duration * factor:.3g} s"
+        self._check_speeds(factor, what)
+        timing = self.solution.b / factor**2
+        problem = replace(
+            self.solution.problem, timing=timing, duration=math.inf, objective=objective
+        )
+        return replace(self, solution=_solve(self.scenario, problem, what))
+
+    def _check_speeds(self, factor: float, what: str) -> None:
+        """Refuses what breaks limits of speed or acceleration, which no forces could change."""
+        places = self.tilt[self.solution.problem.stations[:, 0]]
+        broken: dict[str, tuple[float, float]] = {}
+        for kind, power in (("speed", 1), ("acceleration", 2)):
+            for name, used in self.solution.shares.items():
+                k = int(used.argmax())
+                excess = used[k] / factor**power - 1.0
+                if name.startswith(f"{kind} of ") and excess > _EXCESS:
+                    broken[name] = float(excess), float(np.degrees(places[k]))
+        if broken:
+            worst = max(broken, key=lambda name: broken[name][0])
+            raise PlanError(self.scenario.name, what, [(worst, broken[worst][1])])
+
+
+def plan(
+    scenario: Scenario,
+    margins: Margins,
+    objective: PathObjective = PathObjective.LEAST_TIME,
+    duration: float = math.inf,
+    points: int = 100,
+    uncertainty: UncertaintySet = CERTAIN,
+) -> Plan:
+    """Plans the tilt of a scenario.
+
+    Args:
+        scenario: The scene; the timing and the forces of its own phases do not count.
+        margins: What to keep clear of.
+        objective: What is minimised.
+        duration: The longest that the tilt may take [s].
+        points: Grid points, at least 3.
+        uncertainty: What the plan is to serve with one timing and one grip.
+
+    Raises:
+        InvalidInputError: An argument is senseless.
+        PathError: The arms cannot follow the path.
+        PlanError: No timing keeps all limits.
+    """
+    if points < 3:
+        raise InvalidInputError("points", points, "an integer >= 3")
+    problem, curve, joints = path_problem(scenario, margins, points, uncertainty)
+    problem = replace(problem, objective=objective, duration=duration)
+    what = "every tilt" if math.isinf(duration) else f"every tilt in at most {duration:g} s"
+    return Plan(scenario, margins, joints, _solve(scenario, problem, what), curve)
+
+
+def _solve(scenario: Scenario, problem: PathProblem, what: str) -> PathSolution:
+    try:
+        return solve_path(problem)
+    except InfeasiblePathError as error:
+        binding = [(name, s * scenario.path.angle_deg) for name, s in error.binding]
+        raise PlanError(scenario.name, what, binding) from error

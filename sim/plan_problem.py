@@ -1,0 +1,223 @@
+"""The path problem of a scenario's tilt: contacts, inertia of object and robot, and all limits."""
+
+from __future__ import annotations
+
+import itertools
+import math
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.interpolate import BSpline, make_interp_spline
+from scipy.spatial.transform import Rotation
+
+from sim.checks import not_negative, positive
+from sim.ik import JointPath, plan_joints
+from sim.path import ScrewPath
+from sim.robot import RobotModel
+from sim.scenario import GRAVITY, Scenario
+from sim.settings import Control
+from sim.statics import Statics
+from synthesis import InvalidInputError, Problem
+from synthesis.contact import Array
+from synthesis.path_problem import Accelerations, InertialTorques, Load, PathProblem, Rates
+from synthesis.sensitivity import Gravity
+from synthesis.uncertainty_set import UncertaintySet
+
+# Degree of the spline through the joint angles, and their pose error [m and rad]: a cubic one and
+# a tenth of the accuracy suffice to follow angles, but not for their second derivative.
+_DEGREE, _SOLVED = 7, 1e-10
+
+CERTAIN = UncertaintySet()
+
+
+@dataclass(frozen=True)
+class Margins:
+    """What a plan keeps clear of.
+
+    Attributes:
+        friction_factor: Share of the friction that may be used [-].
+        limits: Share of the robot's torque and speed limits that may be used [-].
+        grip_min, grip_max: Bounds of the hands' normal forces [N]; their own bounds count, too.
+        tip_speed: Largest speed of the hands' contacts [m/s].
+        tip_acceleration: Their largest acceleration [m/s^2]: at the end, how softly it is set down.
+    """
+
+    friction_factor: float = 0.8
+    limits: float = 0.9
+    grip_min: float = 5.0
+    grip_max: float = 60.0
+    tip_speed: float = math.inf
+    tip_acceleration: float = math.inf
+
+    def __post_init__(self) -> None:
+        for name in ("friction_factor", "limits"):
+            if not 0.0 < getattr(self, name) <= 1.0:
+                raise InvalidInputError(f"margins.{name}", getattr(self, name), "in (0, 1]")
+        not_negative("margins.grip_min", self.grip_min)
+        positive("margins.grip_max", self.grip_max)
+        if self.grip_max < self.grip_min:
+            valid = f"at least grip_min = {self.grip_min:g} N"
+            raise InvalidInputError("margins.grip_max", self.grip_max, valid)
+        for name in ("tip_speed", "tip_acceleration"):
+            if not getattr(self, name) > 0.0:
+                raise InvalidInputError(f"margins.{name}", getattr(self, name), "a number > 0")
+
+
+def path_problem(
+    scenario: Scenario, margins: Margins, points: int, uncertainty: UncertaintySet = CERTAIN
+) -> tuple[PathProblem, BSpline, tuple[str, ...]]:
+    """The path problem of a scenario's tilt, the joint angles over its share, and the joints.
+
+    Args:
+        scenario: The scene, whose path the arms follow.
+        margins: What to keep clear of.
+        points: Grid points.
+        uncertainty: By how much the world may differ: one timing and one grip serve all of the
+            set. Its share of friction comes on top of the margins' factor. The first load is the
+            scenario itself, with the set's friction.
+
+    Raises:
+        PathError: The arms cannot follow the path.
+    """
+    robot, path = RobotModel(scenario), ScrewPath(scenario.path)
+    control = Control(friction_factor=margins.friction_factor, preload=margins.grip_min)
+    nominal = UncertaintySet(friction=uncertainty.friction)
+    sets = [(scenario, nominal)]
+    if replace(uncertainty, friction=0.0) != CERTAIN:
+        # What is left of the set at the corners of mass and centre of mass.
+        rest = replace(uncertainty, mass=0.0, center=(0.0, 0.0, 0.0))
+        sets += [(corner, rest) for corner in _corners(scenario, uncertainty)]
+    worlds = [_gripped(world, margins.grip_max) for world, _ in sets]
+    statics = [Statics(world, control, robot) for world in worlds]
+    curve = tilting_curve(plan_joints(scenario, _SOLVED))
+    s = np.linspace(0.0, 1.0, points)
+    q, slope, curvature = curve(s), curve(s, 1), curve(s, 2)
+    problems: list[list[tuple[Problem, ...]]] = [[] for _ in worlds]
+    torques = np.empty((2, *q.shape))
+    for k in range(points):
+        robot.update(q[k])
+        torques[:, k] = robot.inertial_torques(slope[k], curvature[k])
+        R_WO, p_WO = path.pose(path.end * s[k])
+        quaternion = Rotation.from_matrix(R_WO).as_quat(scalar_first=True)
+        for i, world in enumerate(worlds):
+            at_rest = statics[i].problem(p_WO, quaternion, path.end * s[k])
+            limited = _within(at_rest, margins.limits)
+            problems[i].append(sets[i][1].worlds(limited, _gravity(world, R_WO)))
+    rates, accelerations = _tips(scenario, margins, path, s)
+    problem = PathProblem(
+        s=s,
+        loads=tuple(
+            Load(along_path, *wrenches)
+            for i, wrenches in enumerate(inertial_wrenches(world, path, s) for world in worlds)
+            for along_path in zip(*problems[i], strict=True)
+        ),
+        inertial_torques=InertialTorques(torques[0], torques[1], slope * robot.damping),
+        rates=Rates(
+            (*robot.joints, *rates.names),
+            np.hstack([slope, rates.slopes]),
+            np.concatenate([margins.limits * robot.qd_max, rates.limits]),
+        ),
+        accelerations=accelerations,
+    )
+    return problem, curve, robot.joints
+
+
+def _corners(scenario: Scenario, uncertainty: UncertaintySet) -> list[Scenario]:
+    """The scenario with every extreme of mass and centre of mass."""
+    thing = scenario.object
+    shares = {1.0 - uncertainty.mass, 1.0 + uncertainty.mass}
+    places = [
+        {place - offset, place + offset}
+        for place, offset in zip(thing.center_of_mass, uncertainty.center, strict=True)
+    ]
+    corners = []
+    for share, x, y, z in itertools.product(sorted(shares), *map(sorted, places)):
+        a, b, c = (share * moment for moment in thing.inertia)
+        other = replace(thing, mass=share * thing.mass, inertia=(a, b, c), center_of_mass=(x, y, z))
+        corners.append(replace(scenario, object=other))
+    return corners
+
+
+def _gravity(scenario: Scenario, R_WO: Array) -> Gravity:
+    """The weight of a scenario's object, in its axes."""
+    thing = scenario.object
+    down_O = R_WO.T @ np.array([0.0, 0.0, -1.0])
+    return Gravity(thing.mass * GRAVITY, down_O, np.asarray(thing.center_of_mass))
+
+
+def _gripped(scenario: Scenario, grip_max: float) -> Scenario:
+    """The scenario with hands that press no harder than that [N]."""
+    hands = (replace(hand, f_n_max=min(hand.f_n_max, grip_max)) for hand in scenario.hands)
+    return replace(scenario, hands=tuple(hands))
+
+
+def tilting_curve(path: JointPath) -> BSpline:
+    """Joint angles over the share of the tilt, through all phases that turn the object.
+
+    Raises:
+        InvalidInputError: No phase turns it, or one turns it back.
+    """
+    shares: list[Array] = []
+    angles: list[Array] = []
+    for index, phase in enumerate(path.schedule.phases):
+        before = path.schedule.before(index).tilt
+        if phase.tilt < before:
+            raise InvalidInputError(f"phase {phase.name}.tilt", phase.tilt, f"at least {before:g}")
+        if phase.tilt > before:
+            skip = 1 if shares else 0
+            shares.append((before + (phase.tilt - before) * path.progress[index])[skip:])
+            angles.append(path.q[index][skip:])
+    if not shares:
+        raise InvalidInputError("phases", "none that tilts", "a phase that tilts the object")
+    return make_interp_spline(np.concatenate(shares), np.concatenate(angles), k=_DEGREE)
+
+
+def inertial_wrenches(scenario: Scenario, path: ScrewPath, s: Array) -> tuple[Array, Array]:
+    r"""Wrenches that accelerate the object, in its frame, per :math:`\ddot s` and :math:`\dot s^2`.
+
+    Newton and Euler about the centre of mass c, with :math:`\omega` the axis times the angle per s:
+    :math:`f = m\,\ddot c`, :math:`m_c = I \dot\omega + \omega \times I \omega`.
+
+    Args:
+        scenario: Whose object is meant.
+        path: Its path.
+        s: Shares of the tilt, (K,).
+
+    Returns:
+        (K, 6) each.
+    """
+    thing = scenario.object
+    center, inertia = np.asarray(thing.center_of_mass), np.asarray(thing.inertia)
+    wrenches = np.empty((2, len(s), 6))
+    for k, tilt in enumerate(path.end * s):
+        R_WO, _ = path.pose(tilt)
+        slope, curvature = path.derivatives(tilt, center)
+        omega = R_WO.T @ path.axis * path.end
+        forces = thing.mass * path.end * slope, thing.mass * path.end**2 * curvature
+        moments = inertia * omega, np.cross(omega, inertia * omega)
+        for i, (force, moment) in enumerate(zip(forces, moments, strict=True)):
+            f_O = R_WO.T @ force
+            wrenches[i, k] = np.concatenate([f_O, moment + np.cross(center, f_O)])
+    return wrenches[0], wrenches[1]
+
+
+def _within(problem: Problem, share: float) -> Problem:
+    """The problem with a share of the torque limits."""
+    joints = problem.joints
+    assert joints is not None
+    limited = replace(joints, tau_min=share * joints.tau_min, tau_max=share * joints.tau_max)
+    return replace(problem, joints=limited)
+
+
+def _tips(
+    scenario: Scenario, margins: Margins, path: ScrewPath, s: Array
+) -> tuple[Rates, Accelerations]:
+    """Speeds and accelerations of the hands' contacts, which go with the object."""
+    places = [np.asarray(hand.p_OC_O) for hand in scenario.hands]
+    derivatives = np.array([[path.derivatives(path.end * x, p) for p in places] for x in s])
+    slopes, curvatures = path.end * derivatives[:, :, 0], path.end**2 * derivatives[:, :, 1]
+    names = tuple(hand.name for hand in scenario.hands)
+    speeds = np.full(len(names), margins.tip_speed)
+    rates = Rates(names, np.linalg.norm(slopes, axis=2), speeds)
+    limits = np.full(len(names), margins.tip_acceleration)
+    return rates, Accelerations(names, slopes, curvatures, limits)
