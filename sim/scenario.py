@@ -231,6 +231,10 @@ class Pivot:
     pitch: float = 0.0
     travel: Vector = (0.0, 0.0, 0.0)
 
+    def __post_init__(self) -> None:
+        for name in ("point_W", "axis_W", "travel"):
+            length(f"path.{name}", getattr(self, name), 3)
+
 
 @dataclass(frozen=True)
 class View:
