@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass, fields, replace
 
 from sim.checks import length, not_negative, positive, whole
@@ -10,6 +9,8 @@ from synthesis import InvalidInputError, Objective
 
 # A trace takes about 2 kB per step: a gigabyte in this time [s].
 _LONGEST_S = 600.0
+# No arm reaches farther, and the joint path takes a step every 5 mm [m].
+FARTHEST_M = 10.0
 
 
 @dataclass(frozen=True)
@@ -38,8 +39,9 @@ class Phase:
         for field in ("tilt", "grip"):
             if not 0.0 <= getattr(self, field) <= 1.0:
                 raise InvalidInputError(f"{where}.{field}", getattr(self, field), "in [0, 1]")
-        if not (math.isfinite(self.gap) and self.gap >= 0.0):
-            raise InvalidInputError(f"{where}.gap", self.gap, "a finite distance >= 0 m")
+        if not 0.0 <= self.gap <= FARTHEST_M:
+            valid = f"a finite distance >= 0 m and <= {FARTHEST_M:g} m"
+            raise InvalidInputError(f"{where}.gap", self.gap, valid)
         if self.gap > 0.0 and self.grip > 0.0:
             raise InvalidInputError(f"{where}.grip", self.grip, "0 while there is a gap")
 
