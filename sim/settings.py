@@ -9,6 +9,8 @@ from synthesis import InvalidInputError, Objective
 
 # A trace takes about 2 kB per step: a gigabyte in this time [s].
 _LONGEST_S = 600.0
+# A run's steps are to be counted, and kept [s].
+_SHORTEST_STEP_S = 1e-5
 # No arm reaches farther, and the joint path takes a step every 5 mm [m].
 FARTHEST_M = 10.0
 
@@ -181,6 +183,9 @@ class Physics:
 
     def __post_init__(self) -> None:
         positive("physics.timestep", self.timestep)
+        if not _SHORTEST_STEP_S <= self.timestep <= 1.0:
+            valid = f"in [{_SHORTEST_STEP_S:g}, 1] s"
+            raise InvalidInputError("physics.timestep", self.timestep, valid)
         positive("physics.impratio", self.impratio)
         whole("physics.noslip_iterations", self.noslip_iterations, least=0)
         length("physics.solimp", self.solimp, 3)
