@@ -6,7 +6,17 @@ import math
 from dataclasses import dataclass, replace
 
 from sim.checks import axes, length, not_negative, positive, vector
-from sim.settings import HOLD, REACH, STANDOFF, TILT, Control, Phase, Physics, Tolerances
+from sim.settings import (
+    FARTHEST_M,
+    HOLD,
+    REACH,
+    STANDOFF,
+    TILT,
+    Control,
+    Phase,
+    Physics,
+    Tolerances,
+)
 from synthesis import InvalidInputError
 
 GRAVITY = 9.81  # [m/s^2]
@@ -231,6 +241,10 @@ class Pivot:
     pitch: float = 0.0
     travel: Vector = (0.0, 0.0, 0.0)
 
+    def __post_init__(self) -> None:
+        for name in ("point_W", "axis_W", "travel"):
+            length(f"path.{name}", getattr(self, name), 3)
+
 
 @dataclass(frozen=True)
 class View:
@@ -273,6 +287,8 @@ class Scenario:
 
     def __post_init__(self) -> None:
         not_negative("standoff", self.standoff)
+        if self.standoff > FARTHEST_M:
+            raise InvalidInputError("standoff", self.standoff, f"at most {FARTHEST_M:g} m")
         if not self.phases:
             raise InvalidInputError("phases", self.phases, "at least one phase")
         for name in self.contact_names:

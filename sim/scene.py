@@ -32,7 +32,7 @@ def compose(scenario: Scenario, motion: ObjectMotion = ObjectMotion.FREE) -> muj
 
     Raises:
         InvalidInputError: The scenario names a joint, mount, part of a hand or geom type that does
-            not exist, or a start angle outside its joint's range.
+            not exist, or a start angle outside its joint's range, or MuJoCo refuses the scene.
     """
     spec = _robot_with_hands(scenario)
     spec.modelname = scenario.name
@@ -42,10 +42,18 @@ def compose(scenario: Scenario, motion: ObjectMotion = ObjectMotion.FREE) -> muj
     _add_object(spec, scenario, motion)
     if motion is ObjectMotion.FREE:
         _add_pairs(spec, scenario)
-        for first, second in unwanted_pairs(scenario, spec.copy().compile()):
+        for first, second in unwanted_pairs(scenario, _compiled(spec)):
             spec.add_pair(geomname1=first, geomname2=second)
     _add_view(spec, scenario)
     return spec
+
+
+def _compiled(spec: mujoco.MjSpec) -> mujoco.MjModel:
+    try:
+        return spec.copy().compile()
+    except ValueError as error:
+        given = " ".join(str(error).split())
+        raise InvalidInputError("scene", given, "one that MuJoCo compiles") from None
 
 
 def hand_body(hand: Hand) -> str:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass, fields, replace
 
 from sim.checks import length, not_negative, positive, whole
@@ -11,6 +10,10 @@ from synthesis.uncertainty_set import UncertaintySet
 
 # A trace takes about 2 kB per step: a gigabyte in this time [s].
 _LONGEST_S = 600.0
+# A run's steps are to be counted, and kept [s].
+_SHORTEST_STEP_S = 1e-5
+# No arm reaches farther, and the joint path takes a step every 5 mm [m].
+FARTHEST_M = 10.0
 
 
 @dataclass(frozen=True)
@@ -39,8 +42,9 @@ class Phase:
         for field in ("tilt", "grip"):
             if not 0.0 <= getattr(self, field) <= 1.0:
                 raise InvalidInputError(f"{where}.{field}", getattr(self, field), "in [0, 1]")
-        if not (math.isfinite(self.gap) and self.gap >= 0.0):
-            raise InvalidInputError(f"{where}.gap", self.gap, "a finite distance >= 0 m")
+        if not 0.0 <= self.gap <= FARTHEST_M:
+            valid = f"a finite distance >= 0 m and <= {FARTHEST_M:g} m"
+            raise InvalidInputError(f"{where}.gap", self.gap, valid)
         if self.gap > 0.0 and self.grip > 0.0:
             raise InvalidInputError(f"{where}.grip", self.grip, "0 while there is a gap")
 
@@ -219,6 +223,9 @@ class Physics:
 
     def __post_init__(self) -> None:
         positive("physics.timestep", self.timestep)
+        if not _SHORTEST_STEP_S <= self.timestep <= 1.0:
+            valid = f"in [{_SHORTEST_STEP_S:g}, 1] s"
+            raise InvalidInputError("physics.timestep", self.timestep, valid)
         positive("physics.impratio", self.impratio)
         whole("physics.noslip_iterations", self.noslip_iterations, least=0)
         length("physics.solimp", self.solimp, 3)

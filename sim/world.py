@@ -95,7 +95,8 @@ class World:
         if self.seed < 0:
             raise InvalidInputError("world.seed", self.seed, "an integer >= 0")
         positive("world.mass", self.mass)
-        positive("world.size", self.size)
+        if not 1e-3 <= self.size <= 1e3:  # its square is to be a number
+            raise InvalidInputError("world.size", self.size, "in [0.001, 1000]")
         vector("world.center_of_mass", self.center_of_mass, 3)
         for name in ("friction", "link_mass", "torque_gain"):
             for factor in getattr(self, name):

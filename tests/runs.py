@@ -16,6 +16,7 @@ from sim.scenario import Geom, Pose, Scenario
 from sim.settings import REACH, Control, Phase, controllers, stretched
 from sim.trace import Trace
 from synthesis.contact import N
+from tests.unguarded import UNGUARDED
 
 NAMES = [name for name, s in scenarios().items() if s.holdable]  # see test_lift.py for the rest
 BOX = "box-tilt"
@@ -113,7 +114,7 @@ CASES = {
     "softer": lambda s: Case(softer(s), s.control),
     "without noslip": lambda s: Case(without_noslip(s), s.control),
     "slippery": lambda s: Case(s, s.control, truth=slippery(s, 0.7)),
-    "no preload": lambda s: Case(s, replace(s.control, preload=0.0)),
+    "no preload": lambda s: Case(s, replace(s.control, preload=0.0, guard=UNGUARDED)),
     "hasty": lambda s: Case(replace(s, phases=stretched(s.phases, 3.5)), s.control),
     "half way": lambda s: Case(half_way(s), s.control),
     "hard": lambda s: Case(hard(s), s.control),

@@ -109,7 +109,7 @@ def good_problem(joints):
 def bad_array(data, array):
     """The array with a few entries, all of them, or its shape made bad."""
     how = data.draw(st.sampled_from(("entry", "entry", "all", "scale", "shape")))
-    array = np.array(array, float)
+    array = np.atleast_1d(np.array(array, float))
     if how == "scale":
         return array * data.draw(st.sampled_from((1e-300, 1e-12, 1e-6, 1e6, 1e12, 1e300, -1.0)))
     if how == "all":
