@@ -97,8 +97,8 @@ class Run:
 
         from scenarios.commands import print_explanation
         from scenarios.sweep import print_outcome
+        from sim.preparation import UnholdableError
         from sim.report import Verdict
-        from sim.run import UnholdableError
         from sim.run import execute as run
 
         request = self._request()

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import time
 from dataclasses import dataclass
 
@@ -103,6 +104,8 @@ class Controller:
         self._supervisor = Supervisor(control.guard)
         self._health = Health(control.guard, scenario, robot, joint_path.start)
         self._tick, self._check_every = 0, max(1, round(_CHECK_S / timestep))
+        self._update_s = control.solve_every * timestep
+        self._calibrates = math.isfinite(control.calibration_s)
         # Since when no forces are found, and when a setpoint last arrived, or none was due [s].
         self._failing_t: float | None = None
         self._heard_t = 0.0
@@ -138,6 +141,8 @@ class Controller:
             self._failing_t, self._heard_t = None, t
         if self._tick % self._control.solve_every == 0:
             self._drives.update_model(seen.q)
+            if free and self._calibrates and mode is Mode.RUN:
+                self._drives.calibrate(self._update_s)
             if not free and self._health.sees_object(seen):
                 started = time.perf_counter()
                 forces = self._synthesize(seen, target.tilt)

@@ -9,6 +9,10 @@ heavy, the same bandwidth :math:`\omega`: damping that is explicit in time stays
 wrists. A joint whose encoder is dead has no impedance. Whatever comes in, what goes out is finite
 and within the limits.
 
+Motors do not make quite what they are asked for. Where the arms move freely, what the impedance has
+to add shows by how much: a torque b that is integrated there takes its place. Joints that carry
+weight get all their torques scaled by 1 + b / g from then on; the others keep b.
+
 A stiff impedance would also oppose the squeeze, by which the hands sink into what they hold. So
 that the force there is the one asked for, it leaves the squeeze to the feed-forward: with J_n the
 Jacobian of the hands' normal directions and e the unit vector along their commanded normal forces,
@@ -35,6 +39,11 @@ from sim.scenario import Scenario
 from sim.settings import Control
 from synthesis.contact import Array, Mask, N
 
+# A joint whose weight takes more than this share of its limit tells its motor's gain by it.
+_CARRYING = 0.05
+# By how much a motor's gain may be off at most.
+_TRUSTED = 1.3
+
 
 class Drives:
     """Turns measured joint states into torques within the limits.
@@ -57,6 +66,8 @@ class Drives:
         # Deviations of angles and speeds, and torques per each of them: both terms in one product.
         self._deviation, self._gains = np.zeros((2, joints)), np.zeros((joints, 2, joints))
         self._sent = np.zeros(joints)
+        self._scale, self._offset = np.ones(joints), np.zeros(joints)
+        self._carrying = _CARRYING * np.maximum(robot.tau_max, -robot.tau_min)
         # Setpoints by path time, in the order of both.
         self._times: list[float] = []
         self._memory: list[Setpoint] = []
@@ -84,6 +95,16 @@ class Drives:
     def follow(self, setpoint: Setpoint) -> None:
         """Takes over a setpoint that has arrived."""
         self._setpoint = setpoint
+        self._share = math.nan
+
+    def calibrate(self, dt: float) -> None:
+        """Learns from arms that move freely what their motors lack; called every dt [s]."""
+        share = dt / self._control.calibration_s
+        lacking = self._offset + (self._scale - 1.0) * self.tau_g + share * self.tau_pull
+        carries = np.abs(self.tau_g) > self._carrying
+        ratio = 1.0 + lacking / np.where(carries, self.tau_g, 1.0)
+        self._scale = np.where(carries, np.clip(ratio, 1.0 / _TRUSTED, _TRUSTED), 1.0)
+        self._offset = np.where(carries, 0.0, lacking)
         self._share = math.nan
 
     def remember(self, path_t: float) -> None:
@@ -128,6 +149,7 @@ class Drives:
         """Torques that hold robot and object, as until the next setpoint or change of share."""
         if share != self._share:
             self._share = share
-            self._tau_held = self.tau_g + share * self._setpoint.tau_f
+            wanted = self.tau_g + share * self._setpoint.tau_f
+            self._tau_held = self._scale * wanted + self._offset
             self.w_held = share * self._setpoint.w_OC_C
         return self._tau_held

@@ -15,7 +15,7 @@ from sim.grip import GripSchedule, pressed
 from sim.ik import JointPath
 from sim.poses import PathProblems
 from sim.scenario import Scenario
-from sim.settings import Control, Robustness
+from sim.settings import Control
 from synthesis import Objective, RobustInfeasibleError, SolverError
 from synthesis.contact import Array
 from synthesis.problem import Problem
@@ -41,7 +41,8 @@ def plan_grip(
 
     Raises:
         PathError: The arms cannot follow the path.
-        RobustInfeasibleError: At a tilt no forces hold even the nominal object.
+        RobustInfeasibleError: At a tilt no forces hold even the nominal object, and the control
+            does not ask for the best effort.
         SolverError: The solver gave neither forces nor a proof.
     """
     if control.robustness is None:
@@ -49,7 +50,7 @@ def plan_grip(
     problems = _true_problems(scenario, control, joint_path)
     tilts_deg = problems.tilts(_STEP_DEG)
     found = [
-        _grip(problems.problem(tilt), problems.gravity(tilt), control.robustness)
+        _grip(problems.problem(tilt), problems.gravity(tilt), control)
         for tilt in tilts_deg.tolist()
     ]
     return GripSchedule(
@@ -85,8 +86,10 @@ def _true_problems(
     return PathProblems(scenario, full, joint_path=joint_path)
 
 
-def _grip(problem: Problem, gravity: Gravity, robustness: Robustness) -> tuple[Array, float]:
+def _grip(problem: Problem, gravity: Gravity, control: Control) -> tuple[Array, float]:
     """Normal forces of the hands [N], (n,), and the share of the robustness that they give."""
+    assert control.robustness is not None
+    robustness = control.robustness
 
     def serving(share: float) -> Array:
         least = problem.contact_set.preload
@@ -98,7 +101,13 @@ def _grip(problem: Problem, gravity: Gravity, robustness: Robustness) -> tuple[A
     try:
         return serving(1.0), 1.0
     except (RobustInfeasibleError, SolverError):
-        share, f_n = 0.0, serving(0.0)
+        share = 0.0
+    try:
+        f_n = serving(share)
+    except RobustInfeasibleError:
+        if not control.best_effort:
+            raise
+        return np.full(len(problem.hands), control.preload), share
     for step in 0.5 ** np.arange(1, _HALVINGS + 1):
         try:
             f_n = serving(share + step)

@@ -12,33 +12,21 @@ from pathlib import Path
 from types import FrameType
 from typing import Any
 
-from sim.explain import Explanation, explain
 from sim.files import check_new_folder, finite, write_json
-from sim.ik import JointPath
 from sim.judge import Judge
 from sim.loop import ClosedLoop, DivergedError
 from sim.monitor import ContactHistory, Monitor
-from sim.poses import PathProblems
+from sim.preparation import Preparation, prepare
 from sim.recording import Recorder, open_viewer
 from sim.report import Report, RunInfo
 from sim.scenario import Scenario
 from sim.settings import Control
 from sim.trace import Trace
 from sim.world import NO_DEVIATION, World
-from synthesis import (
-    FulcrumError,
-    InfeasibleError,
-    SolverError,
-    Synthesizer,
-    UnboundedError,
-)
 
 RECORDING, CONFIG, REPORT = "run.rrd", "config.json", "report.json"
 # Whose versions may change a run's numbers.
 PACKAGES = ("mujoco", "dm-control", "mink", "pin", "clarabel", "rerun-sdk", "numpy", "scipy")
-
-# Steps at which the path is checked for forces before anything moves [deg].
-_CHECK_DEG = 5.0
 
 Progress = Callable[[int, int], None]
 
@@ -68,17 +56,6 @@ class Request:
     world: World = NO_DEVIATION
 
 
-class UnholdableError(FulcrumError):
-    """Somewhere on the path no forces hold the object within all limits; nothing has moved."""
-
-    def __init__(self, explanation: Explanation) -> None:
-        self.explanation = explanation
-        super().__init__(
-            f"{explanation.scenario} cannot be held at {explanation.tilt_deg:g} deg: "
-            f"{explanation.conflict.sentence if explanation.conflict else ''}."
-        )
-
-
 @dataclasses.dataclass(frozen=True, eq=False)
 class Result:
     """What a run gave: the verdict and all that it rests on; what ended it, if something did."""
@@ -90,14 +67,16 @@ class Result:
 
 
 def execute(
-    request: Request, progress: Progress | None = None, joint_path: JointPath | None = None
+    request: Request,
+    progress: Progress | None = None,
+    prepared: Preparation | None = None,
 ) -> Result:
     """Runs to the end, or until interrupted (SIGINT, SIGTERM), and leaves a complete record.
 
     Args:
         request: What to run.
         progress: Called with steps done and steps in total after every block.
-        joint_path: The scenario's, where :func:`holdable_path` has found it already.
+        prepared: What :func:`prepare` gives for the request, where that has been done already.
 
     Raises:
         PathError: The arms cannot follow the path; nothing has moved.
@@ -109,14 +88,15 @@ def execute(
     scenario, out = request.scenario, request.out
     if out is not None:
         check_new_folder("out", out)
-    if joint_path is None and request.control.feedforward and not request.anyway:
-        joint_path = holdable_path(scenario, request.control)
+    if prepared is None:
+        prepared = prepare(scenario, request.control, check=not request.anyway)
     loop = ClosedLoop(
         scenario,
         request.control,
         seed=request.seed,
-        joint_path=joint_path,
+        joint_path=prepared.joint_path,
         world=request.world,
+        grip=prepared.grip,
     )
     monitor = Monitor(loop.truth)
     robot = loop.robot
@@ -166,24 +146,6 @@ def execute(
             write_json(out / REPORT, dataclasses.asdict(report))
             recorder.close(markdown(report))
     return Result(report, trace, history, error)
-
-
-def holdable_path(scenario: Scenario, control: Control) -> JointPath | None:
-    """The joint path; refused if a certificate proves that no forces exist at one of its tilts.
-
-    Raises:
-        PathError: The arms cannot follow the path.
-        UnholdableError: Somewhere on it no forces hold the object.
-    """
-    problems, synthesizer = PathProblems(scenario, control), Synthesizer()
-    for tilt in problems.tilts(_CHECK_DEG):
-        try:
-            synthesizer.solve(problems.problem(float(tilt)))
-        except InfeasibleError:
-            raise UnholdableError(explain(problems, float(tilt), synthesizer)) from None
-        except (SolverError, UnboundedError):
-            continue  # no proof: the controller copes with those as they come
-    return problems.joint_path
 
 
 class _StopSignal:

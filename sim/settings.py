@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, fields, replace
 
 from sim.checks import length, not_negative, positive, whole
@@ -150,6 +151,8 @@ class Control:
         robustness: What the grip has to bear beyond the belief; None for the fixed margins of
             ``friction_factor`` and ``preload`` alone.
         pose_filter_s: Time constant with which the object's measured pose is smoothed [s].
+        calibration_s: Time constant with which the drives learn, while the arms move freely, what
+            their motors lack [s]; infinite for never.
         guard: When the run is held, lowered or stopped.
     """
 
@@ -163,6 +166,7 @@ class Control:
     yielding_squeeze: bool = False
     robustness: Robustness | None = None
     pose_filter_s: float = 0.0
+    calibration_s: float = math.inf
     guard: Guard = Guard()
 
     def __post_init__(self) -> None:
@@ -171,6 +175,8 @@ class Control:
         for name in ("preload", "bandwidth", "pose_filter_s"):
             not_negative(f"control.{name}", getattr(self, name))
         whole("control.solve_every", self.solve_every, least=1)
+        if not self.calibration_s > 0.0:
+            raise InvalidInputError("control.calibration_s", self.calibration_s, "a number > 0")
 
 
 _ROBUSTNESS = Robustness(
@@ -194,6 +200,7 @@ def controllers(control: Control) -> dict[str, Control]:
             bandwidth=150.0,
             yielding_squeeze=True,
             pose_filter_s=0.05,
+            calibration_s=0.2,
         ),
         "margin": control,
         "paper": replace(control, friction_factor=1.0, preload=0.0),

@@ -7,7 +7,8 @@ import pytest
 
 from scenarios import scenarios
 from scenarios.cli import main
-from sim.run import Request, UnholdableError, execute
+from sim.preparation import UnholdableError
+from sim.run import Request, execute
 from sim.scenario import lifted
 from sim.settings import controllers
 

@@ -145,7 +145,8 @@ def test_the_impedance_adds_no_squeeze_but_still_resists_a_shift_of_both_hands(y
     squeeze = normal_forces(torque_of(drives, q, push @ [1e-4, 1e-4]), J_n)
     shift = normal_forces(torque_of(drives, q, push @ [1e-4, -1e-4]), J_n)
     if yielding:
-        np.testing.assert_allclose(squeeze, 0.0, rtol=0, atol=1e-9)
+        # Along e alone: what the other joints' inertia makes of it is a shift, 50 times less.
+        assert abs(squeeze.sum()) < 1e-9
     else:
         assert squeeze.min() > 0.5
     assert shift[0] > 0.5

@@ -90,18 +90,20 @@ def test_links_and_joint_friction_are_changed_where_the_world_says():
 
 def test_motors_make_gain_times_torque_plus_offset_and_noise_of_the_given_size():
     limits, tau = np.full(2, 10.0), np.array([1.0, -2.0])
-    made = Motors(World(torque_gain=(0.9, 1.1), torque_offset=(0.5, 0.0)), limits).torques(tau)
+    names = ("first", "second")
+    world = World(torque_gain=(0.9, 1.1), torque_offset=(0.5, 0.0))
+    made = Motors(world, limits, names).torques(0.0, tau)
     np.testing.assert_allclose(made, [1.4, -2.2])
-    noisy = Motors(World(torque_noise=0.01), limits)
-    samples = np.array([noisy.torques(tau) for _ in range(2000)])
+    noisy = Motors(World(torque_noise=0.01), limits, names)
+    samples = np.array([noisy.torques(0.0, tau) for _ in range(2000)])
     # Standard deviations of 2000 samples are off by 1.6 %; four times that.
     np.testing.assert_allclose(samples.std(axis=0), 0.1, rtol=0.065)
 
 
 def test_noise_of_the_sensors_has_the_given_size_and_leaves_the_plant_alone():
     world = World(seed=3, position_noise=0.001, orientation_noise=0.01, encoder_noise=1e-4)
-    plant, sensors = Plant(BOX, world), Sensors(world)
-    truth = plant.measure()
+    plant = Plant(BOX, world)
+    sensors, truth = Sensors(world, plant.joints), plant.measure()
     seen = [sensors.see(plant.measure()) for _ in range(2000)]
     p = np.array([m.p_WO for m in seen])
     np.testing.assert_allclose(p.std(axis=0), 0.001, rtol=0.065)
@@ -114,8 +116,9 @@ def test_noise_of_the_sensors_has_the_given_size_and_leaves_the_plant_alone():
 
 
 def test_sensors_of_a_world_without_noise_hand_on_what_they_get():
-    given = Measurement(0.0, np.ones(2), np.ones(2), np.ones(3), np.array([1.0, 0, 0, 0]))
-    seen = Sensors(NO_DEVIATION).see(given)
+    turn = np.array([1.0, 0.0, 0.0, 0.0])
+    given = Measurement(0.0, np.ones(2), np.ones(2), np.ones(3), turn, np.ones(2))
+    seen = Sensors(NO_DEVIATION, ("first", "second")).see(given)
     assert seen is given
 
 

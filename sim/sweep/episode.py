@@ -10,9 +10,10 @@ from functools import lru_cache
 from typing import Any
 
 from sim.files import finite
-from sim.ik import JointPath, plan_joints
+from sim.ik import plan_joints
+from sim.preparation import Preparation, prepare
 from sim.robot import RobotModel
-from sim.run import Request, Result, execute, holdable_path
+from sim.run import Request, Result, execute
 from sim.scenario import Scenario
 from sim.settings import Control, controllers
 from sim.sweep.criteria import stretches, violations
@@ -30,13 +31,13 @@ class Prepared:
     Attributes:
         sweep: The sweep.
         controls: Settings by controller.
-        joint_path: How the arms follow the object's path, which the truth does not change.
+        preparations: What is planned, by controller; the truth does not change it.
         joints: Names of the robot's joints.
     """
 
     sweep: Sweep
     controls: dict[str, Control]
-    joint_path: JointPath
+    preparations: dict[str, Preparation]
     joints: tuple[str, ...]
 
 
@@ -49,10 +50,15 @@ def prepared(packed: bytes) -> Prepared:
     """
     sweep: Sweep = pickle.loads(packed)
     known = controllers(sweep.scenario.control)
+    controls = {name: known[name] for name in sweep.controllers}
+    path = plan_joints(sweep.scenario)
     return Prepared(
         sweep=sweep,
-        controls={name: known[name] for name in sweep.controllers},
-        joint_path=plan_joints(sweep.scenario),
+        controls=controls,
+        preparations={
+            name: prepare(sweep.scenario, control, check=False, joint_path=path)
+            for name, control in controls.items()
+        },
         joints=RobotModel(sweep.scenario).joints,
     )
 
@@ -66,10 +72,7 @@ def check_holdable(sweep: Sweep) -> None:
     """
     known = controllers(sweep.scenario.control)
     for name in sweep.controllers:
-        if known[name].feedforward:
-            holdable_path(sweep.scenario, known[name])
-        else:
-            plan_joints(sweep.scenario)
+        prepare(sweep.scenario, known[name])
 
 
 def run_episode(packed: bytes, episode: Episode) -> Row:
@@ -97,7 +100,7 @@ def run_episode(packed: bytes, episode: Episode) -> Row:
     }
     request = Request(sweep.scenario, episode.controller, control, episode.seed, world=world)
     try:
-        result = execute(request, joint_path=shared.joint_path)
+        result = execute(request, prepared=shared.preparations[episode.controller])
     except Exception as error:  # whatever ends an episode is its failure, not the sweep's
         text = f"{type(error).__name__}: {error}"
         row |= {"cause": "error", "category": "error", "failed_at_s": 0.0, "error": text}

@@ -1,0 +1,84 @@
+"""What is planned before anything moves, and refused if it cannot be done."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from sim.explain import Explanation, explain
+from sim.grip import GripSchedule
+from sim.ik import JointPath, plan_joints
+from sim.poses import PathProblems
+from sim.robust import plan_grip
+from sim.scenario import Scenario
+from sim.settings import Control
+from synthesis import (
+    FulcrumError,
+    InfeasibleError,
+    SolverError,
+    Synthesizer,
+    UnboundedError,
+)
+
+# Steps at which the path is checked for forces [deg].
+_CHECK_DEG = 5.0
+
+
+class UnholdableError(FulcrumError):
+    """Somewhere on the path no forces hold the object within all limits; nothing has moved."""
+
+    def __init__(self, explanation: Explanation) -> None:
+        self.explanation = explanation
+        super().__init__(
+            f"{explanation.scenario} cannot be held at {explanation.tilt_deg:g} deg: "
+            f"{explanation.conflict.sentence if explanation.conflict else ''}."
+        )
+
+
+@dataclass(frozen=True, eq=False)
+class Preparation:
+    """What depends on belief and controller alone, so that runs can share it.
+
+    Attributes:
+        joint_path: How the arms follow the object's path.
+        grip: The least grip over the tilt; None for the control's preload alone.
+    """
+
+    joint_path: JointPath
+    grip: GripSchedule | None
+
+
+def prepare(
+    scenario: Scenario,
+    control: Control,
+    check: bool = True,
+    joint_path: JointPath | None = None,
+) -> Preparation:
+    """Plans a run.
+
+    Args:
+        scenario: What the controller believes.
+        control: The controller.
+        check: Whether to refuse what a certificate proves infeasible at one of the path's tilts.
+        joint_path: The scenario's, where it is planned already.
+
+    Raises:
+        PathError: The arms cannot follow the path.
+        UnholdableError: Somewhere on it no forces hold the object.
+    """
+    joint_path = joint_path or plan_joints(scenario)
+    if not control.feedforward:
+        return Preparation(joint_path, None)
+    if check:
+        _check(PathProblems(scenario, control, joint_path=joint_path))
+    return Preparation(joint_path, plan_grip(scenario, control, joint_path))
+
+
+def _check(problems: PathProblems) -> None:
+    synthesizer = Synthesizer()
+    for tilt in problems.tilts(_CHECK_DEG).tolist():
+        try:
+            synthesizer.solve(problems.problem(tilt))
+        except InfeasibleError:
+            raise UnholdableError(explain(problems, tilt, synthesizer)) from None
+        except (SolverError, UnboundedError):
+            continue  # no proof: the controller copes with those as they come
