@@ -19,12 +19,12 @@ class Setpoint:
     Attributes:
         tau_f: Torques that make the contact forces [N·m or N], (l,).
         w_OC_C: Those forces on the object in contact axes [N, N·m], (m, 6).
-        J_n: Jacobian of the hands' normal directions, (n, l).
+        J_C: Jacobians of the hands in contact axes, (n, 6, l).
     """
 
     tau_f: Array
     w_OC_C: Array
-    J_n: Array
+    J_C: Array
 
 
 class Channel:

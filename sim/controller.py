@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import time
 from dataclasses import dataclass
 
@@ -33,7 +32,7 @@ from synthesis import (
     UnboundedError,
 )
 from synthesis.best_effort import BestEffort, best_effort
-from synthesis.contact import Array, Mask, N
+from synthesis.contact import Array, Mask
 
 # Time between looks at the run's health [s].
 _CHECK_S = 0.01
@@ -104,8 +103,6 @@ class Controller:
         self._supervisor = Supervisor(control.guard)
         self._health = Health(control.guard, scenario, robot, joint_path.start)
         self._tick, self._check_every = 0, max(1, round(_CHECK_S / timestep))
-        self._update_s = control.solve_every * timestep
-        self._calibrates = math.isfinite(control.calibration_s)
         # Since when no forces are found, and when a setpoint last arrived, or none was due [s].
         self._failing_t: float | None = None
         self._heard_t = 0.0
@@ -141,8 +138,6 @@ class Controller:
             self._failing_t, self._heard_t = None, t
         if self._tick % self._control.solve_every == 0:
             self._drives.update_model(seen.q)
-            if free and self._calibrates and mode is Mode.RUN:
-                self._drives.calibrate(self._update_s)
             if not free and self._health.sees_object(seen):
                 started = time.perf_counter()
                 forces = self._synthesize(seen, target.tilt)
@@ -201,8 +196,8 @@ class Controller:
         forces = self._solve(problem)
         if forces is not None:
             assert problem.joints is not None
-            J_n = problem.joints.J_C[:, N]
-            setpoint = Setpoint(forces.tau - self._drives.tau_g, forces.w_OC_C, J_n)
+            tau_f = forces.tau - self._drives.tau_g
+            setpoint = Setpoint(tau_f, forces.w_OC_C, problem.joints.J_C)
             self._channel.send(seen.t, setpoint)
         return forces
 

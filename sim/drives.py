@@ -9,10 +9,6 @@ heavy, the same bandwidth :math:`\omega`: damping that is explicit in time stays
 wrists. A joint whose encoder is dead has no impedance. Whatever comes in, what goes out is finite
 and within the limits.
 
-Motors do not make quite what they are asked for. Where the arms move freely, what the impedance has
-to add shows by how much: a torque b that is integrated there takes its place. Joints that carry
-weight get all their torques scaled by 1 + b / g from then on; the others keep b.
-
 A stiff impedance would also oppose the squeeze, by which the hands sink into what they hold. So
 that the force there is the one asked for, it leaves the squeeze to the feed-forward: with J_n the
 Jacobian of the hands' normal directions and e the unit vector along their commanded normal forces,
@@ -33,16 +29,12 @@ import numpy as np
 
 from sim.channel import Setpoint
 from sim.plant import Measurement
+from sim.reaction import GripReaction
 from sim.references import Target
 from sim.robot import RobotModel
 from sim.scenario import Scenario
 from sim.settings import Control
 from synthesis.contact import Array, Mask, N
-
-# A joint whose weight takes more than this share of its limit tells its motor's gain by it.
-_CARRYING = 0.05
-# By how much a motor's gain may be off at most.
-_TRUSTED = 1.3
 
 
 class Drives:
@@ -60,14 +52,14 @@ class Drives:
         joints = len(robot.joints)
         self.tau_g, self.tau_pull = np.zeros((2, joints))
         contacts, hands = len(scenario.contact_names), len(scenario.hands)
-        none = np.zeros(joints), np.zeros((contacts, 6)), np.zeros((hands, joints))
+        none = np.zeros(joints), np.zeros((contacts, 6)), np.zeros((hands, 6, joints))
         self._setpoint = Setpoint(*none)
         self._share, self._tau_held, self.w_held = math.nan, self.tau_g, self._setpoint.w_OC_C
         # Deviations of angles and speeds, and torques per each of them: both terms in one product.
         self._deviation, self._gains = np.zeros((2, joints)), np.zeros((joints, 2, joints))
         self._sent = np.zeros(joints)
-        self._scale, self._offset = np.ones(joints), np.zeros(joints)
-        self._carrying = _CARRYING * np.maximum(robot.tau_max, -robot.tau_min)
+        self._reaction, self._extra = GripReaction(scenario, control, robot), 0.0
+        self._update_s = control.solve_every * scenario.physics.timestep
         # Setpoints by path time, in the order of both.
         self._times: list[float] = []
         self._memory: list[Setpoint] = []
@@ -76,6 +68,10 @@ class Drives:
         """Takes over joint angles [rad or m], (l,), for gravity and gains until the next update."""
         self._robot.update(q)
         omega, mass_matrix = self._control.bandwidth, self._robot.mass_matrix()
+        share, pull, dt = self._share, self.tau_pull, self._update_s
+        self._extra = self._reaction.update(
+            mass_matrix, self._setpoint, pull, self.tau_g, share, dt
+        )
         if self._control.yielding_squeeze:
             mass_matrix = self._without_squeeze(mass_matrix)
         self._gains[:, 0], self._gains[:, 1] = omega**2 * mass_matrix, 2.0 * omega * mass_matrix
@@ -84,7 +80,8 @@ class Drives:
 
     def _without_squeeze(self, mass_matrix: Array) -> Array:
         """The mass matrix less its part along the squeeze that is asked for."""
-        J_n, f_n = self._setpoint.J_n, self._setpoint.w_OC_C[: len(self._setpoint.J_n), N]
+        J_n = self._setpoint.J_C[:, N]
+        f_n = self._setpoint.w_OC_C[: len(J_n), N]
         squeeze = float(np.linalg.norm(f_n))
         if self._share == 0.0 or squeeze == 0.0:
             return mass_matrix
@@ -95,16 +92,6 @@ class Drives:
     def follow(self, setpoint: Setpoint) -> None:
         """Takes over a setpoint that has arrived."""
         self._setpoint = setpoint
-        self._share = math.nan
-
-    def calibrate(self, dt: float) -> None:
-        """Learns from arms that move freely what their motors lack; called every dt [s]."""
-        share = dt / self._control.calibration_s
-        lacking = self._offset + (self._scale - 1.0) * self.tau_g + share * self.tau_pull
-        carries = np.abs(self.tau_g) > self._carrying
-        ratio = 1.0 + lacking / np.where(carries, self.tau_g, 1.0)
-        self._scale = np.where(carries, np.clip(ratio, 1.0 / _TRUSTED, _TRUSTED), 1.0)
-        self._offset = np.where(carries, 0.0, lacking)
         self._share = math.nan
 
     def remember(self, path_t: float) -> None:
@@ -149,7 +136,10 @@ class Drives:
         """Torques that hold robot and object, as until the next setpoint or change of share."""
         if share != self._share:
             self._share = share
-            wanted = self.tau_g + share * self._setpoint.tau_f
-            self._tau_held = self._scale * wanted + self._offset
+            self._tau_held = self.tau_g + share * self._setpoint.tau_f
             self.w_held = share * self._setpoint.w_OC_C
+            if self._extra > 0.0:
+                squeeze = share * self._extra * self._reaction.direction
+                self._tau_held += squeeze @ self._setpoint.J_C[:, N]
+                self.w_held[: len(squeeze), N] += squeeze
         return self._tau_held

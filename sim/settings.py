@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass, fields, replace
 
 from sim.checks import length, not_negative, positive, whole
@@ -85,13 +84,17 @@ class Robustness:
         uncertainty: The worlds that it serves, with the true friction.
         preload: Least normal force of the hands [N], against pushes that no grip alone withstands:
             stiff hands and their friction do.
+        reaction: By how much harder the hands may press while the impedance holds more than was
+            expected [N].
     """
 
     uncertainty: UncertaintySet
     preload: float
+    reaction: float = 0.0
 
     def __post_init__(self) -> None:
         not_negative("robustness.preload", self.preload)
+        not_negative("robustness.reaction", self.reaction)
 
 
 @dataclass(frozen=True)
@@ -151,8 +154,6 @@ class Control:
         robustness: What the grip has to bear beyond the belief; None for the fixed margins of
             ``friction_factor`` and ``preload`` alone.
         pose_filter_s: Time constant with which the object's measured pose is smoothed [s].
-        calibration_s: Time constant with which the drives learn, while the arms move freely, what
-            their motors lack [s]; infinite for never.
         guard: When the run is held, lowered or stopped.
     """
 
@@ -166,7 +167,6 @@ class Control:
     yielding_squeeze: bool = False
     robustness: Robustness | None = None
     pose_filter_s: float = 0.0
-    calibration_s: float = math.inf
     guard: Guard = Guard()
 
     def __post_init__(self) -> None:
@@ -175,13 +175,12 @@ class Control:
         for name in ("preload", "bandwidth", "pose_filter_s"):
             not_negative(f"control.{name}", getattr(self, name))
         whole("control.solve_every", self.solve_every, least=1)
-        if not self.calibration_s > 0.0:
-            raise InvalidInputError("control.calibration_s", self.calibration_s, "a number > 0")
 
 
 _ROBUSTNESS = Robustness(
     UncertaintySet(mass=0.2, center=(0.02, 0.02, 0.02), friction=0.2, placement=0.005),
     preload=52.0,
+    reaction=30.0,
 )
 
 
@@ -200,7 +199,6 @@ def controllers(control: Control) -> dict[str, Control]:
             bandwidth=150.0,
             yielding_squeeze=True,
             pose_filter_s=0.05,
-            calibration_s=0.2,
         ),
         "margin": control,
         "paper": replace(control, friction_factor=1.0, preload=0.0),
