@@ -85,13 +85,15 @@ class GripReaction:
         need = np.linalg.norm(w_C * self._needs, axis=1) - w_C[:, N]
         wanted = float((need / self.direction).max())
         eased = self._extra * math.exp(-dt / _EASE_S)
-        self._extra = min(max(wanted, eased, 0.0), self._most, self._room(setpoint, tau_g + pull, share))
+        self._extra = min(
+            max(wanted, eased, 0.0), self._most, self._room(setpoint, tau_g + pull, share)
+        )
         return self._extra
 
-    def _room(self, setpoint: Setpoint, tau_g: Array, share: float) -> float:
-        """How much the torques leave for pressing harder [N]."""
+    def _room(self, setpoint: Setpoint, tau: Array, share: float) -> float:
+        """How much the torques, those without the setpoint's given, leave for it [N]."""
         per_newton = self.direction @ setpoint.J_C[:, N]
-        tau = tau_g + share * setpoint.tau_f
+        tau = tau + share * setpoint.tau_f
         limit = np.where(per_newton > 0.0, self._robot.tau_max, self._robot.tau_min)
         with np.errstate(divide="ignore", invalid="ignore"):
             room = np.where(per_newton == 0.0, np.inf, (_TORQUE * limit - tau) / per_newton)

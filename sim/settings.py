@@ -196,7 +196,7 @@ def controllers(control: Control) -> dict[str, Control]:
         "robust": replace(
             control,
             robustness=_ROBUSTNESS,
-            bandwidth=150.0,
+            bandwidth=5.0 * control.bandwidth,
             yielding_squeeze=True,
             pose_filter_s=0.05,
         ),

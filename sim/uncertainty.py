@@ -16,6 +16,9 @@ from sim.world import Push, World
 from synthesis import InvalidInputError
 from synthesis.contact import Array
 
+# More pushes than this in one manoeuvre are a mistake.
+_MOST_PUSHES = 1000
+
 
 @dataclass(frozen=True)
 class Uncertainty:
@@ -70,6 +73,8 @@ class Uncertainty:
             if not getattr(self, name) < 1.0:
                 raise InvalidInputError(f"uncertainty.{name}", getattr(self, name), "in [0, 1)")
         whole("uncertainty.pushes", self.pushes, least=0)
+        if self.pushes > _MOST_PUSHES:
+            raise InvalidInputError("uncertainty.pushes", self.pushes, f"at most {_MOST_PUSHES}")
 
 
 NOMINAL = Uncertainty()

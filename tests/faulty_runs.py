@@ -11,7 +11,7 @@ from sim.faults import Fault, FaultKind
 from sim.robot import RobotModel
 from sim.run import Request, Result, execute
 from sim.scenario import Geom, Pose, Scenario
-from sim.settings import REACH, stretched
+from sim.settings import stretched
 from sim.world import NO_DEVIATION, Push, World
 from tests.short_run import short_tilt
 from tests.unguarded import UNGUARDED
@@ -25,7 +25,6 @@ TOO_FAR = scenario("cylinder-tilt")
 TOO_FAR = replace(
     TOO_FAR, path=replace(TOO_FAR.path, angle_deg=83.0), phases=stretched(TOO_FAR.phases, 3.0)
 )
-REACHING = replace(TILT, standoff=0.06, phases=(*REACH, *TILT.phases[2:]))
 
 
 def broken(kind, t=BEGIN, **options):
@@ -125,10 +124,10 @@ CASES = {
         broken(KIND.WEIGHT, extra_n=20.0), "mm off ", ("hold", "stop"), (BEGIN, BEGIN + 0.2)
     ),
     "post over the wrist": Case(
-        post(0.03, 0.70, 0.34, 0.21), "the torque of left_s1 is cut", ("hold", "stop"), (2.0, 2.6)
+        post(0.03, 0.70, 0.34, 0.21), "the tilt is ", ("hold", "stop"), (2.0, 2.8)
     ),
-    "post in front of the arm": Case(
-        post(0.05, 0.52, 0.365, 0.23), "joint left_", LOWERS, (0.3, 1.5), REACHING
+    "post beside the elbow": Case(
+        post(0.05, 0.42, 0.58, 0.24), "the torque of left_s1 is cut", LOWERS, (1.0, 1.6)
     ),
 }
 # Faults of which a run without the guard is shown to end worse.

@@ -13,10 +13,14 @@ SAME_FORCE = 0.02
 
 
 def force_shift(name, first, second):
-    """Difference of two runs' normal forces over the peak commanded one, (k, m), and the rows."""
+    """Difference of two runs' normal forces over the peak commanded one, (k, m), and the rows.
+
+    As far as both go: what fails is lowered or stopped.
+    """
     peak = np.abs(first.trace.w_command_C[..., N]).max(axis=0)
-    shift = (second.history.w_OC_C - first.history.w_OC_C)[..., N] / peak
-    return shift, settled(name, first.trace)
+    steps = min(len(first.trace), len(second.trace))
+    shift = (second.history.w_OC_C[:steps] - first.history.w_OC_C[:steps])[..., N] / peak
+    return shift, settled(name, first.trace)[:steps]
 
 
 def by_role(name, outcome):
@@ -50,9 +54,11 @@ def role_shift(name, case):
     When the far side of a face comes down, the edge hands over part of its load within a step.
     Which step that is differs by one: each force is compared with the nearest of three steps.
     """
-    default, other = by_role(name, run(name, "default")), by_role(name, run(name, case))
+    both = [by_role(name, run(name, which)) for which in ("default", case)]
+    steps = min(map(len, both))
+    default, other = (forces[:steps] for forces in both)
     near = np.stack([np.roll(other, lag, axis=0) for lag in (-1, 0, 1)])
-    rows = settled(name, run(name, "default").trace)
+    rows = settled(name, run(name, "default").trace)[:steps]
     return np.abs(near - default).min(axis=0)[rows].max(axis=0) / default[rows].max(axis=0)
 
 

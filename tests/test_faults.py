@@ -139,8 +139,11 @@ def test_without_the_guard_the_same_fault_ends_worse(name):
     def worst_deg(trace):
         return np.degrees(np.abs(trace.tilt - trace.tilt_ref)).max()
 
-    assert worst_deg(without.trace) > 2.0 * worst_deg(with_it.trace)
-    assert abs(np.degrees(without.trace.tilt[-1])) > 30.0
+    # With it the object lies where it lay; without, it is left standing or a hand goes astray.
+    assert worst_deg(without.trace) > 3.0 * worst_deg(with_it.trace)
+    assert abs(np.degrees(with_it.trace.tilt[-1])) < 0.01
+    astray_m = without.history.slip.max()
+    assert abs(np.degrees(without.trace.tilt[-1])) > 30.0 or astray_m > 0.1
 
 
 def test_a_moment_s_silence_does_not_move_the_object_differently_after():

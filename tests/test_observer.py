@@ -205,10 +205,9 @@ def commanded(pose_filter_s, turn):
     controller = Controller(BOX, control, RobotModel(BOX), joint_path)
     turned = quat_WO.copy()
     mujoco.mju_quatIntegrate(turned, np.array([0.0, -turn, 0.0]), 1.0)
-    rows = ((t, quat_WO), (t + T, turned))
+    rows, none = ((t, quat_WO), (t + T, turned)), np.zeros(len(q))
     return [
-        controller.command(Measurement(at, q, np.zeros(len(q)), p_WO, quat)).w_OC_C
-        for at, quat in rows
+        controller.command(Measurement(at, q, none, p_WO, quat, none)).w_OC_C for at, quat in rows
     ]
 
 

@@ -105,11 +105,11 @@ def gripping(control, squeeze_n):
     drives = Drives(BOX, control, ROBOT)
     drives.update_model(q)
     problem = PathProblems(BOX, BOX.control, joint_path=planned()).problem(0.0)
-    J_n = problem.joints.J_C[:, N]
+    J_C = problem.joints.J_C
     w_OC_C = np.zeros((4, 6))
     w_OC_C[:2, N] = squeeze_n
-    drives.follow(Setpoint(np.zeros(len(q)), w_OC_C, J_n))
-    return drives, J_n, q
+    drives.follow(Setpoint(np.zeros(len(q)), w_OC_C, J_C))
+    return drives, J_C[:, N], q
 
 
 def seen(q):
