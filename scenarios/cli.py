@@ -64,8 +64,8 @@ class Run:
     scenario: tyro.conf.Positional[str]
     """Name of the scenario (see `fulcrum list`)."""
 
-    controller: str = "margin"
-    """margin, paper or no-feedforward."""
+    controller: str = "robust"
+    """robust, margin, paper or no-feedforward."""
 
     objective: str | None = None
     """What the synthesis minimises (see `fulcrum list`); the scenario's own if left out."""

@@ -30,6 +30,8 @@ if TYPE_CHECKING:
 _CONFIRMED_SHARES = (0.95, 1.05)
 # How many of the constraints that stop a change are named in a table.
 _NAMED = 4
+# Steps of the tilt at which it is said how much uncertainty a grip bears [deg].
+_BORNE_DEG = 15.0
 # Relative slopes by the centre of mass below this are not shown [1/m]: 0.001 % per mm.
 _VISIBLE_PER_M = 0.01
 
@@ -42,7 +44,7 @@ class Explain:
     """Name of the scenario (see `fulcrum list`)."""
 
     controller: str = "margin"
-    """Whose margins count: margin, paper or no-feedforward."""
+    """Whose margins count: robust, margin, paper or no-feedforward."""
 
     tilt_deg: float | None = None
     """Tilt [deg]; the first infeasible or else tightest one if left out."""
@@ -61,6 +63,7 @@ class Explain:
         from sim.explain import explain, tightest_tilt
         from sim.files import write_json
         from sim.poses import PathProblems
+        from sim.robust import borne
         from synthesis import Synthesizer
 
         check_json(self.json)
@@ -72,8 +75,14 @@ class Explain:
             tilt = tightest_tilt(problems, synthesizer)
         explanation = explain(problems, tilt, synthesizer)
         print_explanation(Console(highlight=False), explanation, self.controller)
+        content = dataclasses.asdict(explanation)
+        if explanation.feasible and control.robustness is not None:
+            bears = {
+                tilt: found.factor for tilt, found in borne(chosen, control, _BORNE_DEG).items()
+            }
+            _print_borne(Console(highlight=False), bears)
+            content["uncertainty_borne"] = bears
         if self.json is not None:
-            content = dataclasses.asdict(explanation)
             write_json(self.json, {"controller": self.controller, **content})
         return PASSED if explanation.feasible else FAILED
 
@@ -132,6 +141,17 @@ class Capacity:
             write_json(self.json, content)
         confirmed = all((t.verdict is Verdict.PASS) is (t.share < 1.0) for t in trials)
         return PASSED if confirmed else FAILED
+
+
+def _print_borne(console: Console, bears: dict[float, float]) -> None:
+    """Prints the largest scaling of the controller's uncertainty set that one grip bears."""
+    from rich.box import SIMPLE
+    from rich.table import Table
+
+    table = Table("tilt deg", "of the uncertainty set one grip bears", box=SIMPLE)
+    for tilt, factor in bears.items():
+        table.add_row(f"{tilt:g}", f"{100 * factor:.0f} %")
+    console.print(table)
 
 
 def print_explanation(console: Console, explanation: Explanation, controller: str) -> None:
