@@ -74,7 +74,7 @@ class Drives:
         )
         if self._control.yielding_squeeze:
             mass_matrix = self._without_squeeze(mass_matrix)
-        self._gains[:, 0], self._gains[:, 1] = omega**2 * mass_matrix, 2.0 * omega * mass_matrix
+        self._gains[:, 0], self._gains[:, 1] = self._reaction.braced(mass_matrix, omega)
         self.tau_g = self._robot.gravity()
         self._share = math.nan  # what was held is to be found anew
 

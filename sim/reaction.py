@@ -1,4 +1,4 @@
-r"""Presses harder as soon as the impedance has to hold what the synthesis did not expect.
+r"""Presses harder, and stiffens, as soon as the impedance holds what the synthesis did not expect.
 
 The impedance's torques :math:`\tau_p` mean contact wrenches of the hands, here by least squares,
 weighted like kinetic energy:
@@ -7,7 +7,8 @@ weighted like kinetic energy:
 
 With them on top of those of the synthesis each hand needs the normal force that puts it on the
 friction cone (2) of the paper; if that is near to what there is, all hands press harder along the
-squeeze that moves nothing: the null vector of the normal forces' grasp map.
+squeeze that moves nothing, the null vector of the normal forces' grasp map, and the arms brace: all
+joints become stiffer, and light ones, by which the object would swing about the hands, much more.
 """
 
 from __future__ import annotations
@@ -24,9 +25,13 @@ from sim.settings import Control
 from synthesis.contact import Array, ContactSet, N
 
 # Share of the normal force that may be needed before the hands press harder [-].
-_NEEDED = 0.7
+_NEEDED = 0.78
 # Share of the torque limits that pressing harder may use [-].
-_TORQUE = 0.8
+_TORQUE = 0.88
+# How much stiffer joints are that brace; light ones have less than a share of the largest inertia.
+_BRACED, _BRACED_LIGHT, _LIGHT = 4.0 / 3.0, 8.0 / 3.0, 0.1
+# Less than this is let be [N].
+_LEAST = 0.5
 # How slowly the hands ease off again [s].
 _EASE_S = 0.5
 # Singular values below this share of the largest are zero.
@@ -68,10 +73,11 @@ class GripReaction:
             setpoint: What the drives make.
             pull: Torques of the impedance [N·m or N], (l,).
             tau_g: Torques that hold the robot up [N·m or N], (l,).
-            share: Of the setpoint's forces that is applied [-].
+            share: Of the setpoint's forces that is applied [-]; below 1 the hands come or go, and
+                what they make is their own affair.
             dt: Time since the last update [s].
         """
-        if self._most == 0.0 or not share > 0.0 or not setpoint.w_OC_C.any():
+        if self._most == 0.0 or not share >= 1.0 or not setpoint.w_OC_C.any():
             self._extra = 0.0
             return 0.0
         hands = len(self.direction)
@@ -89,6 +95,22 @@ class GripReaction:
             max(wanted, eased, 0.0), self._most, self._room(setpoint, tau_g + pull, share)
         )
         return self._extra
+
+    def braced(self, mass_matrix: Array, omega: float) -> tuple[Array, Array]:
+        """Stiffness and damping per unit of deviation, (l, l), of joints that brace.
+
+        Args:
+            mass_matrix: What the impedance is scaled by, (l, l).
+            omega: Bandwidth of joints that don't [rad/s].
+        """
+        if self._extra == 0.0:
+            return omega**2 * mass_matrix, 2.0 * omega * mass_matrix
+        inertia = mass_matrix.diagonal()
+        light = inertia < _LIGHT * inertia.max()
+        bandwidth = omega * np.where(light, _BRACED_LIGHT, _BRACED)
+        root = np.sqrt(bandwidth)
+        stiffness = bandwidth[:, None] * mass_matrix * bandwidth
+        return stiffness, 2.0 * root[:, None] * mass_matrix * root
 
     def _room(self, setpoint: Setpoint, tau: Array, share: float) -> float:
         """How much the torques, those without the setpoint's given, leave for it [N]."""

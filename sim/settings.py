@@ -180,7 +180,7 @@ class Control:
 _ROBUSTNESS = Robustness(
     UncertaintySet(mass=0.2, center=(0.02, 0.02, 0.02), friction=0.2, placement=0.005),
     preload=52.0,
-    reaction=30.0,
+    reaction=45.0,
 )
 
 
