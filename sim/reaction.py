@@ -85,15 +85,15 @@ class GripReaction:
         weighted = np.linalg.solve(mass_matrix, J.T)
         compliance = J @ weighted
         # Hands that share joints cannot make all wrenches: a trace of damping picks the smallest.
-        compliance.flat[:: 6 * hands + 1] += _SINGULAR * compliance.trace()
+        compliance.flat[:: 6 * hands + 1] *= 1.0 + _SINGULAR
         f_p = np.linalg.solve(compliance, weighted.T @ pull).reshape(hands, 6)
         w_C = share * setpoint.w_OC_C[:hands] + f_p
         need = np.linalg.norm(w_C * self._needs, axis=1) - w_C[:, N]
         wanted = float((need / self.direction).max())
         eased = self._extra * math.exp(-dt / _EASE_S)
-        self._extra = min(
-            max(wanted, eased, 0.0), self._most, self._room(setpoint, tau_g + pull, share)
-        )
+        room = self._room(setpoint, tau_g + pull, share)
+        extra = min(max(wanted, eased), self._most, room)
+        self._extra = extra if extra > _LEAST else 0.0
         return self._extra
 
     def braced(self, mass_matrix: Array, omega: float) -> tuple[Array, Array]:
