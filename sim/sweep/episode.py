@@ -9,15 +9,17 @@ from collections.abc import Mapping, Sequence
 from functools import lru_cache
 from typing import Any
 
+from sim.execution import Execution, planned_tilt
 from sim.files import finite
 from sim.ik import JointPath, plan_joints
 from sim.robot import RobotModel
 from sim.run import Request, Result, execute, holdable_path
 from sim.scenario import Scenario
 from sim.settings import Control, controllers
-from sim.sweep.criteria import stretches, violations
+from sim.sweep.criteria import violations
 from sim.sweep.design import Episode, Sweep
 from sim.sweep.parameters import PARAMETERS
+from sim.trace import stretches
 from sim.world import World
 
 Row = dict[str, Any]
@@ -31,12 +33,14 @@ class Prepared:
         sweep: The sweep.
         controls: Settings by controller.
         joint_path: How the arms follow the object's path, which the truth does not change.
+        execution: The planned tilt, if it is planned.
         joints: Names of the robot's joints.
     """
 
     sweep: Sweep
     controls: dict[str, Control]
     joint_path: JointPath
+    execution: Execution | None
     joints: tuple[str, ...]
 
 
@@ -49,10 +53,12 @@ def prepared(packed: bytes) -> Prepared:
     """
     sweep: Sweep = pickle.loads(packed)
     known = controllers(sweep.scenario.control)
+    planned = None if sweep.planning is None else planned_tilt(sweep.scenario, sweep.planning)
     return Prepared(
         sweep=sweep,
         controls={name: known[name] for name in sweep.controllers},
-        joint_path=plan_joints(sweep.scenario),
+        joint_path=plan_joints(sweep.scenario) if planned is None else planned.joint_path,
+        execution=planned,
         joints=RobotModel(sweep.scenario).joints,
     )
 
@@ -64,6 +70,8 @@ def check_holdable(sweep: Sweep) -> None:
         PathError: The arms cannot follow the path.
         UnholdableError: A controller finds no forces somewhere on the path.
     """
+    if sweep.planning is not None:
+        return  # there is a plan, or there would be no sweep of it
     known = controllers(sweep.scenario.control)
     for name in sweep.controllers:
         if known[name].feedforward:
@@ -95,9 +103,16 @@ def run_episode(packed: bytes, episode: Episode) -> Row:
         "replay": sweep.replay(episode),
         **_truths(world, sweep.scenario, shared.joints),
     }
-    request = Request(sweep.scenario, episode.controller, control, episode.seed, world=world)
+    request = Request(
+        sweep.scenario,
+        episode.controller,
+        control,
+        episode.seed,
+        world=world,
+        planning=sweep.planning,
+    )
     try:
-        result = execute(request, joint_path=shared.joint_path)
+        result = execute(request, joint_path=shared.joint_path, execution=shared.execution)
     except Exception as error:  # whatever ends an episode is its failure, not the sweep's
         text = f"{type(error).__name__}: {error}"
         row |= {"cause": "error", "category": "error", "failed_at_s": 0.0, "error": text}
