@@ -206,7 +206,7 @@ class Controller:
         if self._supervisor.mode is Mode.RUN and before is Mode.HOLD:
             anew, why = replanner.rested(target), "the run goes on"
         elif self._supervisor.mode is Mode.RUN:
-            anew, why = replanner.caught(target, seen), "the arms are off their path"
+            anew, why = replanner.caught(target, seen), "the arms have fallen behind"
         if anew is None:
             return
         self._references = References(anew.joint_path, self._timestep)

@@ -18,7 +18,8 @@ from sim.ik import JointPath, plan_joints
 from sim.plan import Plan, plan
 from sim.plan_problem import own_margins
 from sim.scenario import Scenario
-from sim.settings import Phase, Tolerances
+from sim.schedule import Schedule
+from sim.settings import Phase, Tolerances, stretched
 from sim.timing import Timing
 from synthesis import InvalidInputError
 from synthesis.contact import N
@@ -28,6 +29,9 @@ from synthesis.path_problem import PathObjective
 LEAST_TIME = PathObjective.LEAST_TIME.value
 # With a shorter time constant contacts sink in no further than with the default settings.
 _SOLREF, _SOLIMP = (0.003, 1.0), (0.8, 0.8, 0.001)
+
+# In which no arm is at its speed limits, and inverse kinematics finds the path alone.
+_SLOW_S = 10.0
 
 
 @dataclass(frozen=True)
@@ -79,7 +83,9 @@ def planned_tilt(scenario: Scenario, planning: Planning) -> Execution:
         PathError: The arms cannot follow the path.
         PlanError: No timing keeps all limits.
     """
-    planned = plan(scenario, own_margins(scenario.control), points=planning.points)
+    # Whatever timing the scenario has, planned ones included, the plan is the same.
+    slow = replace(scenario, phases=stretched(scenario.phases, _SLOW_S))
+    planned = plan(slow, own_margins(scenario.control), points=planning.points)
     if planning.stretch != 1.0:
         planned = planned.stretched(planning.stretch)
     found = planned.solution
@@ -100,7 +106,8 @@ def planned_tilt(scenario: Scenario, planning: Planning) -> Execution:
             saturated_s=0.02,
         ),
     )
-    return Execution(fast, planning, planned, plan_joints(fast), _grip(planned))
+    joint_path = replace(plan_joints(slow), schedule=Schedule(fast))
+    return Execution(fast, planning, planned, joint_path, _grip(planned))
 
 
 def timed(phases: tuple[Phase, ...], timing: Timing) -> tuple[Phase, ...]:

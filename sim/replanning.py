@@ -3,14 +3,15 @@ r"""When the rest of a planned tilt is planned anew, by a stated rule.
 ==============================================  ===================================================
 what happens during the tilt                    from where, at what rate
 ==============================================  ===================================================
-the arms are more than 0.5 deg off, as a tilt   where the arms are, at their rate
+the arms fall 0.5 deg behind, as a tilt         where the arms are, at their rate
 a held run goes on                              where it was held, from rest
 ==============================================  ===================================================
 
-How far the arms are off counts along the path: with :math:`q(s)` the joint angles over the share of
-the tilt, by :math:`\Delta s = q' \cdot (q - q_d) / \|q'\|^2`, and their rate by
+How far the arms are behind counts along the path: with :math:`q(s)` the joint angles over the
+share of the tilt, by :math:`\Delta s = q' \cdot (q_d - q) / \|q'\|^2`, and their rate by
 :math:`\dot s = q' \cdot \dot q / \|q'\|^2`. The rest is planned in least time at the plan's own
 stretch. If there is no such plan, as when they are too fast to stop in time, the timing stays.
+Arms that are pushed ahead are left to the impedance.
 """
 
 from __future__ import annotations
@@ -28,8 +29,8 @@ from sim.references import Target
 from sim.schedule import Schedule
 from synthesis import SolverError
 
-# How far the arms may be off [rad of tilt]; contacts yield by a tenth of it.
-_OFF = np.radians(0.5)
+# How far the arms may fall behind [rad of tilt]; without disturbances it is a tenth of that.
+_BEHIND = np.radians(0.5)
 # Grid points of a whole path and of the shortest rest: a few percent of the time, in a quarter of
 # the time that the plan itself takes.
 _POINTS, _FEWEST = 30, 5
@@ -58,17 +59,17 @@ class Replanner:
         self._margins, self._end = execution.plan.margins, execution.joint_path.schedule.end
         self.phase, self.joint_path = execution.phase, execution.joint_path
 
-    def off(self, target: Target, seen: Measurement) -> float:
-        """How far the arms are ahead of a target of the tilt, as a tilt [rad]."""
+    def behind(self, target: Target, seen: Measurement) -> float:
+        """How far the arms are behind a target of the tilt, as a tilt [rad]."""
         slope = self.joint_path.at(self.phase, target.tilt / self._end)[1]
-        return self._end * float(slope.dot(seen.q - target.q) / slope.dot(slope))
+        return self._end * float(slope.dot(target.q - seen.q) / slope.dot(slope))
 
     def caught(self, target: Target, seen: Measurement) -> Anew | None:
-        """The rest from where the arms are, if they are too far off."""
-        off = self.off(target, seen)
-        if abs(off) <= _OFF:
+        """The rest from where the arms are, if they have fallen behind."""
+        behind = self.behind(target, seen)
+        if behind <= _BEHIND:
             return None
-        share = float(np.clip((target.tilt + off) / self._end, 0.0, 1.0))
+        share = max(0.0, (target.tilt - behind) / self._end)
         slope = self.joint_path.at(self.phase, share)[1]
         return self.planned(share, max(0.0, float(slope.dot(seen.qd) / slope.dot(slope))))
 

@@ -69,13 +69,6 @@ LEAVE = (
 )
 
 
-def tilting_s(phases: tuple[Phase, ...]) -> float:
-    """How long all phases that tilt the object take together [s]."""
-    before = (0.0, *(phase.tilt for phase in phases))
-    pairs = zip(phases, before, strict=False)
-    return sum(phase.duration_s for phase, tilt in pairs if phase.tilt != tilt)
-
-
 def stretched(phases: tuple[Phase, ...], duration_s: float) -> tuple[Phase, ...]:
     """The phases with every one that tilts the object taking the given time [s]."""
     before = (0.0, *(phase.tilt for phase in phases))
