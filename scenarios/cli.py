@@ -141,7 +141,9 @@ class Run:
 
         chosen = scenario(self.scenario)
         planning, planned = chosen_planning(self.plan, self.stretch), None
-        controller = self.controller or ("margin" if planning is None else "dynamic")
+        controller = "margin" if planning is None else "dynamic"
+        if self.controller is not None:
+            controller = self.controller
         control = chosen_control(chosen, controller, self.objective)
         if planning is not None:
             if self.duration is not None:
