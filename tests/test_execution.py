@@ -25,7 +25,7 @@ from synthesis.contact import N
 from tests.executions import broken, executed, execution, longest
 from tests.plans import BOX, CYLINDER, fastest
 from tests.recordings import Content
-from tests.runs import rows_of
+from tests.runs import rows_of, settled
 
 TICK = 0.001
 
@@ -57,6 +57,18 @@ def test_without_inertia_the_same_timing_breaks_them():
     counted = executed(BOX, 1.0)
     worst = [np.abs(r.trace.tilt - r.trace.tilt_ref).max() for r in (quasi_static, counted)]
     assert worst[0] > 2.0 * worst[1]
+
+
+def test_with_the_contacts_of_slow_runs_a_support_hops_and_nothing_else_changes():
+    chosen, planned = scenario(CYLINDER), execution(CYLINDER, 1.2)
+    slow = replace(planned, scenario=replace(planned.scenario, physics=chosen.physics))
+    control = controllers(chosen.control)["dynamic"]
+    request = Request(chosen, "dynamic", control, planning=Planning(1.2))
+    result = execute(request, execution=slow)
+    assert broken(CYLINDER, result) == {"contacts"}
+    lost = ~result.history.kept[settled(CYLINDER, result.trace)]
+    assert not lost[:, :2].any()
+    assert longest(lost) <= 3
 
 
 def test_the_longest_cut_is_found():
