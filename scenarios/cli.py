@@ -20,6 +20,7 @@ from scenarios.common import (
     INTERRUPTED,
     PASSED,
     chosen_control,
+    chosen_planning,
     progress_bar,
     results_folder,
 )
@@ -28,6 +29,7 @@ from scenarios.planning import Plan
 from scenarios.sweep import Sweep
 
 if TYPE_CHECKING:
+    from sim.execution import Execution
     from sim.report import Report
     from sim.run import Request
 
@@ -64,11 +66,17 @@ class Run:
     scenario: tyro.conf.Positional[str]
     """Name of the scenario (see `fulcrum list`)."""
 
-    controller: str = "robust"
-    """robust, margin, paper or no-feedforward."""
+    controller: str | None = None
+    """See `fulcrum list`; robust if left out, or dynamic with a plan."""
 
     objective: str | None = None
     """What the synthesis minimises (see `fulcrum list`); the scenario's own if left out."""
+
+    plan: str | None = None
+    """least-time: plan the tilt as `fulcrum plan` does, and execute that."""
+
+    stretch: float = 1.0
+    """By how much the planned duration is stretched."""
 
     duration: float | None = None
     """Duration of the tilt [s]; the scenario's own if left out."""
@@ -97,18 +105,23 @@ class Run:
 
         from scenarios.commands import print_explanation
         from scenarios.sweep import print_outcome
+        from sim.plan import PlanError
         from sim.preparation import UnholdableError
         from sim.report import Verdict
         from sim.run import execute as run
 
-        request = self._request()
-        assert request.out is not None
         try:
+            request, planned = self._request()
+            assert request.out is not None
             with progress_bar(self.scenario) as progress:
-                result = run(request, progress)
+                result = run(request, progress, execution=planned)
         except UnholdableError as error:
-            print_explanation(Console(highlight=False), error.explanation, self.controller)
+            console, controller = Console(highlight=False), self.controller or "robust"
+            print_explanation(console, error.explanation, controller)
             print("Nothing has moved; --anyway shows what happens.")
+            return FAILED
+        except PlanError as error:
+            print(error)
             return FAILED
         report = result.report
         _print_report(report, request.out)
@@ -117,26 +130,39 @@ class Run:
         codes = {Verdict.PASS: PASSED, Verdict.FAIL: FAILED, Verdict.INTERRUPTED: INTERRUPTED}
         return codes[report.verdict]
 
-    def _request(self) -> Request:
+    def _request(self) -> tuple[Request, Execution | None]:
+        """What to run, and its planned tilt, if it is to be planned."""
         from scenarios import scenario
         from scenarios.sweep import drawn_world
+        from sim.execution import planned_tilt
         from sim.run import Request
         from sim.settings import stretched
         from synthesis.errors import InvalidInputError
 
         chosen = scenario(self.scenario)
-        control = chosen_control(chosen, self.controller, self.objective)
-        if self.duration is not None:
+        planning, planned = chosen_planning(self.plan, self.stretch), None
+        controller = "robust" if planning is None else "dynamic"
+        if self.controller is not None:
+            controller = self.controller
+        control = chosen_control(chosen, controller, self.objective)
+        if planning is not None:
+            if self.duration is not None:
+                valid = "left out with --plan, which --stretch prolongs"
+                raise InvalidInputError("--duration", self.duration, valid)
+            planned = planned_tilt(chosen, planning)
+            chosen = planned.scenario
+        elif self.duration is not None:
             chosen = replace(chosen, phases=stretched(chosen.phases, self.duration))
         if self.seed < 0:
             raise InvalidInputError("--seed", self.seed, "an integer >= 0")
         if self.anyway:
             control = replace(control, best_effort=True)
         world = drawn_world(chosen, self.preset, self.seed, self.world)
-        out = results_folder(self.out, f"{self.scenario}-{self.controller}")
-        return Request(
-            chosen, self.controller, control, self.seed, out, self.live, self.anyway, world
+        out = results_folder(self.out, f"{self.scenario}-{controller}")
+        request = Request(
+            chosen, controller, control, self.seed, out, self.live, self.anyway, world, planning
         )
+        return request, planned
 
 
 @dataclass(frozen=True)

@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Protocol
 
 if TYPE_CHECKING:
+    from sim.execution import Planning
     from sim.scenario import Scenario
     from sim.settings import Control
 
@@ -35,6 +36,24 @@ def chosen_control(scenario: Scenario, controller: str, objective: str | None) -
     if objective not in list(Objective):
         raise InvalidInputError("--objective", objective, f"one of {', '.join(Objective)}")
     return replace(control, objective=Objective(objective))
+
+
+def chosen_planning(plan: str | None, stretch: float) -> Planning | None:
+    """How the tilt is planned; None if it is not.
+
+    Raises:
+        InvalidInputError: There is no such plan, or none to be stretched.
+    """
+    from sim.execution import LEAST_TIME, Planning
+    from synthesis.errors import InvalidInputError
+
+    if plan is None:
+        if stretch != 1.0:
+            raise InvalidInputError("--stretch", stretch, f"given with --plan {LEAST_TIME}")
+        return None
+    if plan != LEAST_TIME:
+        raise InvalidInputError("--plan", plan, LEAST_TIME)
+    return Planning(stretch)
 
 
 class Move(Protocol):

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -122,15 +122,16 @@ class Plan:
         return objective, own if objective.needs_duration else math.inf
 
     def _margins(self, chosen: Scenario) -> Margins:
-        from sim.plan_problem import Margins
+        from sim.plan_problem import own_margins
 
-        own = chosen.control
-        return Margins(
+        own = own_margins(chosen.control)
+        return replace(
+            own,
             friction_factor=(
                 own.friction_factor if self.friction_factor is None else self.friction_factor
             ),
             limits=self.limits,
-            grip_min=own.preload if self.grip_min is None else self.grip_min,
+            grip_min=own.grip_min if self.grip_min is None else self.grip_min,
             grip_max=self.grip_max,
             tip_speed=self.tip_speed,
             tip_acceleration=self.tip_acceleration,

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 
 import tyro
 
-from scenarios.common import INTERRUPTED, PASSED, progress_bar
+from scenarios.common import FAILED, INTERRUPTED, PASSED, chosen_planning, progress_bar
 
 if TYPE_CHECKING:
     from sim.run import Result
@@ -40,7 +40,14 @@ class Sweep:
     """How far worlds are from what is believed: nominal, lab, field or harsh."""
 
     controllers: str | None = None
-    """Names with commas between; all meet the same worlds. All but no-feedforward if left out."""
+    """Names with commas between; all meet the same worlds. All with feed-forward if left out: with
+    a plan those that count with inertia, else those that do not."""
+
+    plan: str | None = None
+    """least-time: plan the tilt, and execute that in every world."""
+
+    stretch: float = 1.0
+    """By how much the planned duration is stretched."""
 
     grid: str = ""
     """What to set of every world drawn, like friction=0.7:1.3:7,weight=0.8,1.0,1.2 (factors)."""
@@ -64,12 +71,18 @@ class Sweep:
     def execute(self) -> int:
         """Does it; returns the exit code."""
         from sim.files import write_json
+        from sim.plan import PlanError
         from sim.sweep.farm import Workers, run_sweep
         from sim.sweep.picture import draw_map
         from sim.sweep.store import MAP, SUMMARY, Store
         from sim.sweep.summary import scores
 
-        sweep, workers = self._sweep(), Workers(self.workers, self.scheduler)
+        workers = Workers(self.workers, self.scheduler)
+        try:
+            sweep = self._sweep()
+        except PlanError as error:
+            print(error)
+            return FAILED
         pair = self._map(sweep)
         store = Store(sweep, self._folder())
         before, started = len(store.missing()), time.perf_counter()
@@ -122,14 +135,18 @@ class Sweep:
 
     def _sweep(self) -> Design:
         from scenarios import scenario
+        from sim.execution import planned_tilt
         from sim.settings import controllers
         from sim.sweep.design import Sweep as Design
         from sim.sweep.parameters import parse_grid
 
-        chosen = scenario(self.scenario)
+        chosen, planning = scenario(self.scenario), chosen_planning(self.plan, self.stretch)
+        if planning is not None:
+            chosen = planned_tilt(chosen, planning).scenario
         if self.controllers is None:
             known = controllers(chosen.control)
-            names = [name for name, control in known.items() if control.feedforward]
+            fast = planning is not None
+            names = [n for n, c in known.items() if c.feedforward and c.inertia is fast]
         else:
             names = [name.strip() for name in self.controllers.split(",")]
         return Design(
@@ -139,6 +156,7 @@ class Sweep:
             episodes=self.episodes,
             seed=self.seed,
             grid=parse_grid("--grid", self.grid),
+            planning=planning,
         )
 
     def _map(self, sweep: Design) -> tuple[str, str]:

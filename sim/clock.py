@@ -12,12 +12,13 @@ class PathClock:
     Attributes:
         delay: Plant's time minus path time [s].
         rate: Seconds of path per second [-].
+        change: How fast that changes [1/s].
     """
 
     def __init__(self, timestep: float) -> None:
         """Starts in step with the plant's time, which ticks in steps [s]."""
         self._timestep = timestep
-        self.delay, self.rate = 0.0, 1.0
+        self.delay, self.rate, self.change = 0.0, 1.0, 0.0
 
     def at(self, t: float, rate: float) -> float:
         """Path time at the next tick [s], not before the path's start.
@@ -29,6 +30,13 @@ class PathClock:
         if self.rate != 1.0 or rate != 1.0:
             before, change = self.rate, _RAMP * self._timestep
             self.rate = min(max(rate, before - change), before + change)
+            self.change = (self.rate - before) / self._timestep
             self.delay += (1.0 - 0.5 * (before + self.rate)) * self._timestep
             self.delay = min(self.delay, t)
+        else:
+            self.change = 0.0
         return t - self.delay
+
+    def set(self, t: float, path_t: float) -> None:
+        """Brings path time to a value [s] at a time of the plant [s], from where it runs on."""
+        self.delay, self.rate, self.change = t - path_t, 1.0, 0.0

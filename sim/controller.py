@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -14,10 +14,12 @@ from sim.grip import GripSchedule
 from sim.guard import Event, Mode, Supervisor
 from sim.health import Health, Sent
 from sim.ik import JointPath
+from sim.inertia import inertial_wrenches
 from sim.observer import PoseObserver
 from sim.path import ScrewPath
 from sim.plant import Measurement
 from sim.references import References, Target
+from sim.replanning import Replanner
 from sim.robot import RobotModel
 from sim.scenario import Scenario
 from sim.settings import Control
@@ -48,7 +50,7 @@ class Command:
         phase: Index of the phase.
         mode: What the run is doing.
         q_ref: Reference angles [rad or m], (l,).
-        tilt_ref: Reference tilt [rad].
+        tilt_ref, rate_ref: Reference tilt [rad] and its rate [rad/s].
         w_OC_C: Commanded wrenches on the object in contact axes [N, N·m], (m, 6).
         synthesis_s: Wall time of this tick's synthesis [s]; 0 where none was due.
         failed: Whether this tick's synthesis had no solution, so that the last forces, or with best
@@ -61,6 +63,7 @@ class Command:
     mode: Mode
     q_ref: Array
     tilt_ref: float
+    rate_ref: float
     w_OC_C: Array
     synthesis_s: float
     failed: bool
@@ -77,6 +80,7 @@ class Controller:
         joint_path: JointPath,
         channel: Channel | None = None,
         grip: GripSchedule | None = None,
+        replanner: Replanner | None = None,
     ) -> None:
         """Takes over what it believes.
 
@@ -87,10 +91,12 @@ class Controller:
             joint_path: What the drives follow.
             channel: The wire to the drives; an ideal one if left out.
             grip: The least normal forces of the hands; the control's preload if left out.
+            replanner: Plans the rest of a planned tilt anew where need be.
         """
+        self._replanner, self._timestep = replanner, scenario.physics.timestep
         self._control, schedule = control, joint_path.schedule
-        timestep = scenario.physics.timestep
-        self._references = References(joint_path, timestep)
+        self._scenario, self._robot, self._path = scenario, robot, ScrewPath(scenario.path)
+        self._references = References(joint_path, self._timestep)
         self._free, self._held = schedule.free, schedule.held
         # Once the grip has been let go for good there is nothing left to be lowered.
         self._last_held = max(schedule.held.nonzero()[0].tolist(), default=-1)
@@ -98,11 +104,11 @@ class Controller:
         self._synthesizer = Synthesizer()
         self._drives = Drives(scenario, control, robot)
         self._channel = channel or Channel(NO_DEVIATION)
-        self._observer = PoseObserver(ScrewPath(scenario.path), control.pose_filter_s)
-        self._clock, self._total_s = PathClock(timestep), schedule.total_s
+        self._observer = PoseObserver(self._path, control.pose_filter_s)
+        self._clock, self._total_s = PathClock(self._timestep), schedule.total_s
         self._supervisor = Supervisor(control.guard)
         self._health = Health(control.guard, scenario, robot, joint_path.start)
-        self._tick, self._check_every = 0, max(1, round(_CHECK_S / timestep))
+        self._tick, self._check_every = 0, max(1, round(_CHECK_S / self._timestep))
         # Since when no forces are found, and when a setpoint last arrived, or none was due [s].
         self._failing_t: float | None = None
         self._heard_t = 0.0
@@ -128,19 +134,19 @@ class Controller:
         mode = self._supervisor.mode
         path_t = self._clock.at(t, self._supervisor.rate)
         target = self._references.at(path_t)
-        if self._clock.rate != 1.0:
-            target = target._replace(qd=self._clock.rate * target.qd)
+        if self._clock.rate != 1.0 or self._clock.change != 0.0:
+            target = target.on_clock(self._clock.rate, self._clock.change)
         if self._supervisor.stands:
             self._q_stop = seen.q if self._q_stop is None else self._q_stop
-            target = target._replace(q=self._q_stop, qd=np.zeros_like(target.qd))
+            target = Target(target.phase, target.tilt, target.grip, self._q_stop, 0.0 * target.qd)
         synthesis_s, failed, free = 0.0, False, bool(self._free[target.phase])
         if free:
             self._failing_t, self._heard_t = None, t
         if self._tick % self._control.solve_every == 0:
-            self._drives.update_model(seen.q)
+            self._drives.update_model(seen.q, target if self._control.inertia else None)
             if not free and self._health.sees_object(seen):
                 started = time.perf_counter()
-                forces = self._synthesize(seen, target.tilt)
+                forces = self._synthesize(seen, target)
                 synthesis_s = time.perf_counter() - started
                 failed = not isinstance(forces, Solution)
                 if forces is not None:
@@ -161,6 +167,7 @@ class Controller:
             phase=target.phase,
             mode=mode,
             tilt_ref=target.tilt,
+            rate_ref=target.rate,
             w_OC_C=self._drives.w_held,
             synthesis_s=synthesis_s,
             failed=failed,
@@ -186,20 +193,49 @@ class Controller:
             failing_s=0.0 if self._failing_t is None else seen.t - self._failing_t,
             silent_s=seen.t - self._heard_t,
         )
-        lowerable = target.phase <= self._last_held
+        lowerable, before = target.phase <= self._last_held, self._supervisor.mode
         self._supervisor.update(seen.t, findings, path_t, lowerable)
+        if self._replanner is not None and target.phase == self._replanner.phase:
+            self._replan(self._replanner, before, seen, target)
 
-    def _synthesize(self, seen: Measurement, tilt_ref: float) -> Solution | BestEffort | None:
+    def _replan(
+        self, replanner: Replanner, before: Mode, seen: Measurement, target: Target
+    ) -> None:
+        """Follows the rest of a planned tilt in another timing, where that is due."""
+        anew = None
+        if self._supervisor.mode is Mode.RUN and before is Mode.HOLD:
+            anew, why = replanner.rested(target), "the run goes on"
+        elif self._supervisor.mode is Mode.RUN:
+            anew, why = replanner.caught(target, seen), "the arms have fallen behind"
+        if anew is None:
+            return
+        self._references = References(anew.joint_path, self._timestep)
+        self._total_s = anew.joint_path.schedule.total_s
+        self._clock.set(seen.t, anew.path_t)
+        self._drives.forget(anew.path_t)
+        self._supervisor.note(seen.t, why, "plan anew")
+
+    def _synthesize(self, seen: Measurement, target: Target) -> Solution | BestEffort | None:
         """Sends the forces for a measured pose, if there are any."""
-        pose = self._observer.update(seen.t, seen.p_WO, seen.quat_WO, tilt_ref)
-        problem = self._statics.problem(*pose, tilt_ref)
+        pose = self._observer.update(seen.t, seen.p_WO, seen.quat_WO, target.tilt)
+        problem = self._statics.problem(*pose, target.tilt)
+        if self._control.inertia:
+            problem = self._moving(problem, target)
         forces = self._solve(problem)
         if forces is not None:
             assert problem.joints is not None
-            tau_f = forces.tau - self._drives.tau_g
+            tau_f = forces.tau - problem.joints.tau_g
             setpoint = Setpoint(tau_f, forces.w_OC_C, problem.joints.J_C)
             self._channel.send(seen.t, setpoint)
         return forces
+
+    def _moving(self, problem: Problem, target: Target) -> Problem:
+        """The problem in motion: what accelerates object and robot counts as load."""
+        assert problem.joints is not None
+        w_a, w_b = inertial_wrenches(self._scenario, self._path, target.tilt)
+        w_ext_O = problem.w_ext_O - target.acceleration * w_a - target.rate**2 * w_b
+        tau_g = self._drives.tau_g + self._robot.damping * target.qd
+        return replace(problem, w_ext_O=w_ext_O, joints=replace(problem.joints, tau_g=tau_g))
 
     def _solve(self, problem: Problem) -> Solution | BestEffort | None:
         try:

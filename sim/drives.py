@@ -1,10 +1,12 @@
 r"""The drives: joint impedance at the physics' rate along the path, and the forces last asked for.
 
-.. math:: \tau = g(q) + s\,J^T f^* + D \dot q_d
+.. math:: \tau = g(q) + \left[ M \ddot q_d + C(q, \dot q_d) \dot q_d \right]
+                 + s\,J^T f^* + D \dot q_d
                  + M(q) \left( \omega^2 (q_d - q) + 2 \omega (\dot q_d - \dot q) \right)
 
 with :math:`f^*` the forces of the last setpoint that has arrived, s the share of grip that the
-schedule asks for and D the joints' viscous friction. The mass matrix M gives every joint, light or
+schedule asks for and D the joints' viscous friction; what is in brackets only where the control
+counts with inertia. The mass matrix M gives every joint, light or
 heavy, the same bandwidth :math:`\omega`: damping that is explicit in time stays stable on light
 wrists. A joint whose encoder is dead has no impedance. Whatever comes in, what goes out is finite
 and within the limits.
@@ -23,7 +25,7 @@ along their normals (Khatib 1987, the operational space formulation).
 from __future__ import annotations
 
 import math
-from bisect import bisect_right
+from bisect import bisect_left, bisect_right
 
 import numpy as np
 
@@ -41,7 +43,8 @@ class Drives:
     """Turns measured joint states into torques within the limits.
 
     Attributes:
-        tau_g: Torques that hold the robot up, as of the last update of the model (l,).
+        tau_g: Torques that hold the robot up, and where inertia counts also make its motion, as of
+            the last update of the model (l,).
         tau_pull: Torques with which the impedance last pulled the joints to their path (l,).
         w_held: Wrenches on the object that the last torques were to make [N, N·m], (m, 6).
     """
@@ -64,8 +67,13 @@ class Drives:
         self._times: list[float] = []
         self._memory: list[Setpoint] = []
 
-    def update_model(self, q: Array) -> None:
-        """Takes over joint angles [rad or m], (l,), for gravity and gains until the next update."""
+    def update_model(self, q: Array, target: Target | None = None) -> None:
+        """Takes over joint angles [rad or m], (l,), for gravity and gains until the next update.
+
+        Args:
+            q: The angles.
+            target: Whose motion is to be made, inertia and all; None where it does not count.
+        """
         self._robot.update(q)
         omega, mass_matrix = self._control.bandwidth, self._robot.mass_matrix()
         share, pull, dt = self._share, self.tau_pull, self._update_s
@@ -76,6 +84,8 @@ class Drives:
             mass_matrix = self._without_squeeze(mass_matrix)
         self._gains[:, 0], self._gains[:, 1] = self._reaction.braced(mass_matrix, omega)
         self.tau_g = self._robot.gravity()
+        if target is not None and target.qdd is not None:
+            self.tau_g = self.tau_g + self._robot.motion_torques(target.qd, target.qdd)
         self._share = math.nan  # what was held is to be found anew
 
     def _without_squeeze(self, mass_matrix: Array) -> Array:
@@ -98,6 +108,11 @@ class Drives:
         """Keeps the present setpoint as that of a path time [s] after all that are kept."""
         self._times.append(path_t)
         self._memory.append(self._setpoint)
+
+    def forget(self, path_t: float) -> None:
+        """Drops what is kept of path times [s] from this one on."""
+        kept = bisect_left(self._times, path_t)
+        del self._times[kept:], self._memory[kept:]
 
     def recall(self, path_t: float) -> None:
         """Takes over the setpoint that held at a path time [s], if any is kept."""

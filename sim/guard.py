@@ -88,7 +88,7 @@ class Event:
     Attributes:
         t: Time [s].
         cause: What was found, in words.
-        reaction: hold, run, lower, stop or end.
+        reaction: hold, run, plan anew, lower, stop or end.
     """
 
     t: float
@@ -153,6 +153,10 @@ class Supervisor:
             self._wait(t, found, lowerable)
         else:
             self._lower(t, found, path_t)
+
+    def note(self, t: float, text: str, reaction: str) -> None:
+        """Adds what was done by somebody else to the events."""
+        self.events.append(Event(t, text, reaction))
 
     def _hold(self, t: float, text: str) -> None:
         self._enter(Mode.HOLD, t, text)

@@ -84,6 +84,10 @@ class JointPath:
         spline = self._splines[phase]
         return spline(progress), spline(progress, 1)
 
+    def curvature(self, phase: int, progress: Array | float) -> Array:
+        """Second derivatives of the angles by the progress of a phase, (..., l)."""
+        return self._splines[phase](progress, 2)
+
     def holding(self, tilt: float) -> Array:
         """Angles, (l,), that hold the object at a tilt of the path [rad].
 

@@ -21,7 +21,7 @@ from sim.report import (
 )
 from sim.scenario import Scenario
 from sim.schedule import Schedule
-from sim.trace import Trace
+from sim.trace import Trace, stretches
 from synthesis.contact import Array, Mask, N
 
 # Reactions after which a manoeuvre is not completed.
@@ -205,11 +205,14 @@ class Judge:
         return failures
 
     def _torque_failures(self, trace: Trace) -> list[_Failure]:
-        cut = np.any(trace.saturated, axis=1)
+        allowed = round(self._scenario.tolerances.saturated_s / self._scenario.physics.timestep)
+        long = np.array([stretches(flags) > allowed for flags in trace.saturated.T]).T
+        cut = np.any(long, axis=1)
         if not cut.any():
             return []
-        joint = self._joints[int(np.argmax(trace.saturated[np.argmax(cut)]))]
-        count = f"{np.count_nonzero(cut)} of {len(cut)}"
+        joint = self._joints[int(np.argmax(long[np.argmax(cut)]))]
+        every = np.any(trace.saturated, axis=1)
+        count = f"{np.count_nonzero(every)} of {len(cut)}"
         text = f"Torques were cut in {count} steps, first that of {joint} at {{when}}."
         return [_failure(trace, cut, text)]
 

@@ -10,11 +10,13 @@ from dm_control.rl.control import PhysicsError
 from sim.channel import Channel
 from sim.contacts import ContactFrames
 from sim.controller import Controller
+from sim.execution import Execution
 from sim.grip import GripSchedule
 from sim.guard import Event
 from sim.ik import JointPath, plan_joints
 from sim.path import ScrewPath
 from sim.plant import Measurement, Plant
+from sim.replanning import Replanner
 from sim.robot import RobotModel
 from sim.robust import plan_grip
 from sim.scenario import Scenario
@@ -53,6 +55,7 @@ class ClosedLoop:
         joint_path: JointPath | None = None,
         world: World = NO_DEVIATION,
         grip: GripSchedule | None = None,
+        execution: Execution | None = None,
     ) -> None:
         """Plans the joint path, if need be, and sets up plant and controller.
 
@@ -64,6 +67,7 @@ class ClosedLoop:
             joint_path: The scenario's, where it is planned already.
             world: How the plant deviates from that, and what disturbs it; nothing by default.
             grip: What the control's robustness asks for, where it is planned already.
+            execution: The planned tilt, if it is planned; scenario, path and grip are then its own.
 
         Raises:
             InvalidInputError: The world does not fit the scenario.
@@ -71,12 +75,19 @@ class ClosedLoop:
             RobustInfeasibleError: No grip holds even the nominal object somewhere on the path.
             DivergedError: The start's state is more than numbers can hold.
         """
+        replanner = None
+        if execution is not None:
+            scenario, joint_path = execution.scenario, execution.joint_path
+            grip = execution.grip
+            replanner = Replanner(execution) if control.inertia else None
         self._path = ScrewPath(scenario.path)
         self.robot = robot = RobotModel(scenario)
         joint_path = joint_path or plan_joints(scenario)
         self.truth = world.truth(truth or scenario)
         grip = grip or plan_grip(scenario, control, joint_path)
-        self._controller = Controller(scenario, control, robot, joint_path, Channel(world), grip)
+        self._controller = Controller(
+            scenario, control, robot, joint_path, Channel(world), grip, replanner
+        )
         self._plant = Plant(self.truth, world)
         self._sensors = Sensors(world, self._plant.joints)
         deviation = np.random.default_rng(seed).normal(size=len(robot.joints))
@@ -159,6 +170,7 @@ class ClosedLoop:
         plant.step()
         trace.phase[row], trace.mode[row] = command.phase, command.mode
         trace.q_ref[row], trace.tilt_ref[row] = command.q_ref, command.tilt_ref
+        trace.rate_ref[row] = command.rate_ref
         trace.tau[row], trace.saturated[row] = command.tau, command.saturated
         trace.w_command_C[row] = command.w_OC_C
         trace.synthesis_s[row], trace.failed[row] = command.synthesis_s, command.failed

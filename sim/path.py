@@ -84,11 +84,14 @@ class ScrewPath:
         return twist.reshape(np.shape(quaternion)[:-1])
 
 
-def minimum_jerk(x: Array | float) -> tuple[Array, Array]:
-    """Position and velocity of the minimum-jerk profile from 0 to 1 over x in [0, 1], clipped.
+def minimum_jerk(x: Array | float) -> tuple[Array, Array, Array]:
+    """Position, velocity, acceleration of the minimum-jerk profile from 0 to 1 over x in [0, 1].
+
+    x is clipped.
 
     Source: Flash and Hogan 1985, the polynomial 10 x^3 - 15 x^4 + 6 x^5.
     """
     x = np.clip(x, 0.0, 1.0)
     rest = x * (1.0 - x)
-    return x * x * x * (10.0 + x * (6.0 * x - 15.0)), 30.0 * rest * rest
+    acceleration = 60.0 * rest * (1.0 - 2.0 * x)
+    return x * x * x * (10.0 + x * (6.0 * x - 15.0)), 30.0 * rest * rest, acceleration

@@ -56,6 +56,20 @@ class Moment(NamedTuple):
     tau: Array
 
 
+class Along(NamedTuple):
+    """A plan at many tilts.
+
+    Attributes:
+        rate: [rad/s], (k,).
+        w_OC_C: Wrenches on the object in contact axes [N, N·m], (k, m, 6).
+        tau: Joint torques [N·m or N], (k, l).
+    """
+
+    rate: Array
+    w_OC_C: Array
+    tau: Array
+
+
 @dataclass(frozen=True, eq=False)
 class Plan:
     """Timing, joint motion and forces of a tilt, from rest to rest.
@@ -123,6 +137,25 @@ class Plan:
             tau=tau[0] + part * (tau[1] - tau[0]),
         )
 
+    def along(self, tilts: Array) -> Along:
+        """The plan over the tilt instead of time, linear between the ends of each interval.
+
+        Args:
+            tilts: [rad], (k,); beyond its ends the plan's at those.
+        """
+        found, s = self.solution, self.solution.problem.s
+        share = np.clip(tilts / math.radians(self.scenario.path.angle_deg), s[0], s[-1])
+        k = np.clip(np.searchsorted(s, share, side="right") - 1, 0, len(s) - 2)
+        part = (share - s[k]) / (s[k + 1] - s[k])
+        w, tau = found.w_OC_C[0], found.tau[0]
+        squared = found.b[k] + part * (found.b[k + 1] - found.b[k])
+        first, second = 2 * k, 2 * k + 1
+        return Along(
+            rate=np.sqrt(np.maximum(squared, 0.0)) * math.radians(self.scenario.path.angle_deg),
+            w_OC_C=w[first] + part[:, None, None] * (w[second] - w[first]),
+            tau=tau[first] + part[:, None] * (tau[second] - tau[first]),
+        )
+
     def stretched(
         self, factor: float, objective: PathObjective = PathObjective.FRICTION_MARGIN
     ) -> Plan:
@@ -166,6 +199,8 @@ def plan(
     duration: float = math.inf,
     points: int = 100,
     uncertainty: UncertaintySet = CERTAIN,
+    start: float = 0.0,
+    start_rate: float = 0.0,
 ) -> Plan:
     """Plans the tilt of a scenario.
 
@@ -176,6 +211,8 @@ def plan(
         duration: The longest that the tilt may take [s].
         points: Grid points, at least 3.
         uncertainty: What the plan is to serve with one timing and one grip.
+        start: Share of the tilt at which it begins, below 1 [-].
+        start_rate: At which rate of that share [1/s].
 
     Raises:
         InvalidInputError: An argument is senseless.
@@ -184,8 +221,10 @@ def plan(
     """
     if points < 3:
         raise InvalidInputError("points", points, "an integer >= 3")
-    problem, curve, joints = path_problem(scenario, margins, points, uncertainty)
-    problem = replace(problem, objective=objective, duration=duration)
+    if not 0.0 <= start < 1.0:
+        raise InvalidInputError("start", start, "a share in [0, 1)")
+    problem, curve, joints = path_problem(scenario, margins, points, uncertainty, start)
+    problem = replace(problem, objective=objective, duration=duration, start_rate=start_rate)
     what = "every tilt" if math.isinf(duration) else f"every tilt in at most {duration:g} s"
     return Plan(scenario, margins, joints, _solve(scenario, problem, what), curve)
 

@@ -12,6 +12,7 @@ from scipy.spatial.transform import Rotation
 
 from sim.checks import not_negative, positive
 from sim.ik import JointPath, plan_joints
+from sim.inertia import inertial_wrenches
 from sim.path import ScrewPath
 from sim.robot import RobotModel
 from sim.scenario import GRAVITY, Scenario
@@ -63,8 +64,17 @@ class Margins:
                 raise InvalidInputError(f"margins.{name}", getattr(self, name), "a number > 0")
 
 
+def own_margins(control: Control) -> Margins:
+    """Margins with the friction factor and preload of a control."""
+    return Margins(friction_factor=control.friction_factor, grip_min=control.preload)
+
+
 def path_problem(
-    scenario: Scenario, margins: Margins, points: int, uncertainty: UncertaintySet = CERTAIN
+    scenario: Scenario,
+    margins: Margins,
+    points: int,
+    uncertainty: UncertaintySet = CERTAIN,
+    start: float = 0.0,
 ) -> tuple[PathProblem, BSpline, tuple[str, ...]]:
     """The path problem of a scenario's tilt, the joint angles over its share, and the joints.
 
@@ -75,6 +85,7 @@ def path_problem(
         uncertainty: By how much the world may differ: one timing and one grip serve all of the
             set. Its share of friction comes on top of the margins' factor. The first load is the
             scenario itself, with the set's friction.
+        start: Share of the tilt at which the path begins [-].
 
     Raises:
         PathError: The arms cannot follow the path.
@@ -90,7 +101,7 @@ def path_problem(
     worlds = [_gripped(world, margins.grip_max) for world, _ in sets]
     statics = [Statics(world, control, robot) for world in worlds]
     curve = tilting_curve(plan_joints(scenario, _SOLVED))
-    s = np.linspace(0.0, 1.0, points)
+    s = np.linspace(start, 1.0, points)
     q, slope, curvature = curve(s), curve(s, 1), curve(s, 2)
     problems: list[list[tuple[Problem, ...]]] = [[] for _ in worlds]
     torques = np.empty((2, *q.shape))
@@ -103,12 +114,13 @@ def path_problem(
             at_rest = statics[i].problem(p_WO, quaternion, path.end * s[k])
             limited = _within(at_rest, margins.limits)
             problems[i].append(sets[i][1].worlds(limited, _gravity(world, R_WO)))
+    wrenches = [[inertial_wrenches(world, path, path.end * x) for x in s] for world in worlds]
     rates, accelerations = _tips(scenario, margins, path, s)
     problem = PathProblem(
         s=s,
         loads=tuple(
-            Load(along_path, *wrenches)
-            for i, wrenches in enumerate(inertial_wrenches(world, path, s) for world in worlds)
+            Load(along_path, path.end * per_a, path.end**2 * per_b)
+            for i, (per_a, per_b) in enumerate(np.array(wrenches).swapaxes(1, 2))
             for along_path in zip(*problems[i], strict=True)
         ),
         inertial_torques=InertialTorques(torques[0], torques[1], slope * robot.damping),
@@ -170,35 +182,6 @@ def tilting_curve(path: JointPath) -> BSpline:
     if not shares:
         raise InvalidInputError("phases", "none that tilts", "a phase that tilts the object")
     return make_interp_spline(np.concatenate(shares), np.concatenate(angles), k=_DEGREE)
-
-
-def inertial_wrenches(scenario: Scenario, path: ScrewPath, s: Array) -> tuple[Array, Array]:
-    r"""Wrenches that accelerate the object, in its frame, per :math:`\ddot s` and :math:`\dot s^2`.
-
-    Newton and Euler about the centre of mass c, with :math:`\omega` the axis times the angle per s:
-    :math:`f = m\,\ddot c`, :math:`m_c = I \dot\omega + \omega \times I \omega`.
-
-    Args:
-        scenario: Whose object is meant.
-        path: Its path.
-        s: Shares of the tilt, (K,).
-
-    Returns:
-        (K, 6) each.
-    """
-    thing = scenario.object
-    center, inertia = np.asarray(thing.center_of_mass), np.asarray(thing.inertia)
-    wrenches = np.empty((2, len(s), 6))
-    for k, tilt in enumerate(path.end * s):
-        R_WO, _ = path.pose(tilt)
-        slope, curvature = path.derivatives(tilt, center)
-        omega = R_WO.T @ path.axis * path.end
-        forces = thing.mass * path.end * slope, thing.mass * path.end**2 * curvature
-        moments = inertia * omega, np.cross(omega, inertia * omega)
-        for i, (force, moment) in enumerate(zip(forces, moments, strict=True)):
-            f_O = R_WO.T @ force
-            wrenches[i, k] = np.concatenate([f_O, moment + np.cross(center, f_O)])
-    return wrenches[0], wrenches[1]
 
 
 def _within(problem: Problem, share: float) -> Problem:

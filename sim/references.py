@@ -19,6 +19,8 @@ class Target(NamedTuple):
         grip: Share of the synthesised forces [-].
         q: Joint angles [rad or m], (l,).
         qd: Joint speeds [rad/s or m/s], (l,).
+        rate, acceleration: Of the tilt [rad/s, rad/s^2].
+        qdd: Joint accelerations [rad/s^2 or m/s^2], (l,); None for none.
     """
 
     phase: int
@@ -26,6 +28,17 @@ class Target(NamedTuple):
     grip: float
     q: Array
     qd: Array
+    rate: float = 0.0
+    acceleration: float = 0.0
+    qdd: Array | None = None
+
+    def on_clock(self, rate: float, change: float) -> Target:
+        """The same place, come through at a rate of path time [-] that changes [1/s]."""
+        qdd = None if self.qdd is None else rate**2 * self.qdd + change * self.qd
+        acceleration = rate**2 * self.acceleration + change * self.rate
+        return self._replace(
+            qd=rate * self.qd, rate=rate * self.rate, acceleration=acceleration, qdd=qdd
+        )
 
 
 class References:
@@ -39,11 +52,15 @@ class References:
         self._times = np.concatenate([[0.0], np.cumsum(np.full(ticks, timestep))])
         self._asked = asked = path.schedule.at(self._times)
         self._q = np.empty((len(self._times), len(path.start)))
-        self._qd = np.empty_like(self._q)
+        self._qd, self._qdd = np.empty_like(self._q), np.empty_like(self._q)
         for phase in range(len(path.schedule.phases)):
             rows = asked.phase == phase
             q, slope = path.at(phase, asked.progress[rows])
-            self._q[rows], self._qd[rows] = q, slope * asked.rate[rows, None]
+            rate, acceleration = asked.rate[rows, None], asked.acceleration[rows, None]
+            self._q[rows], self._qd[rows] = q, slope * rate
+            curvature = path.curvature(phase, asked.progress[rows])
+            self._qdd[rows] = slope * acceleration + curvature * rate**2
+        self._rate, self._acceleration = asked.turn * asked.rate, asked.turn * asked.acceleration
 
     def at(self, t: float) -> Target:
         """References at a time [s]; read off at ticks, computed between them and after the end."""
@@ -51,10 +68,15 @@ class References:
         if row < len(self._times) and self._times[row] == t:
             asked = self._asked
             phase, tilt, grip = asked.phase[row], asked.tilt[row], asked.grip[row]
-            q, qd = self._q[row], self._qd[row]
+            q, qd, qdd = self._q[row], self._qd[row], self._qdd[row]
+            rate, acceleration = self._rate[row], self._acceleration[row]
         else:
             asked = self._path.schedule.at(t)
             phase, tilt, grip = asked.phase, asked.tilt, asked.grip
             q, slope = self._path.at(int(phase), asked.progress)
-            qd = slope * asked.rate
-        return Target(int(phase), float(tilt), float(grip), q, qd)
+            qd, curvature = slope * asked.rate, self._path.curvature(int(phase), asked.progress)
+            qdd = slope * asked.acceleration + curvature * asked.rate**2
+            rate, acceleration = asked.turn * asked.rate, asked.turn * asked.acceleration
+        return Target(
+            int(phase), float(tilt), float(grip), q, qd, float(rate), float(acceleration), qdd
+        )

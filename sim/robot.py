@@ -43,7 +43,8 @@ class RobotModel:
         self.damping = scene.dof_damping[scene.jnt_dofadr[indices]].copy()
 
         self._model = pinocchio_model(scene)
-        self._data = self._model.createData()
+        # The second, for motion, leaves the first as of the last update.
+        self._data, self._moving = self._model.createData(), self._model.createData()
         # Pinocchio may order joints otherwise; every vector here is in the order of the motors.
         self._order = np.array(
             [self._model.joints[self._model.getJointId(name)].idx_v for name in self.joints]
@@ -96,13 +97,16 @@ class RobotModel:
             :math:`M q'` and :math:`M q'' + C(q, q') q'`, (l,) each: torques per :math:`\ddot s` and
             per :math:`\dot s^2`, without viscous friction.
         """
-        still, q1, q2 = np.zeros((3, self._model.nv))
-        q1[self._order], q2[self._order] = slope, curvature
-        # A copy of the data, whose own stays that of the last update.
-        data, tau_g = self._model.createData(), self._tau_g
-        per_a = pin.rnea(self._model, data, self._q, still, q1).take(self._order) - tau_g
-        per_b = pin.rnea(self._model, data, self._q, q1, q2).take(self._order) - tau_g
-        return per_a, per_b
+        return self.motion_torques(np.zeros_like(slope), slope), self.motion_torques(
+            slope, curvature
+        )
+
+    def motion_torques(self, qd: Array, qdd: Array) -> Array:
+        r""":math:`M \ddot q + C(q, \dot q) \dot q` [N·m or N], (l,), at the last updated angles."""
+        speeds, accelerations = np.zeros((2, self._model.nv))
+        speeds[self._order], accelerations[self._order] = qd, qdd
+        tau = pin.rnea(self._model, self._moving, self._q, speeds, accelerations)
+        return tau.take(self._order) - self._tau_g
 
     def contact_jacobians(self, p_WC: Array, R_WC: Array) -> Array:
         """Jacobians of the hands' points at the contacts, in contact axes.

@@ -12,6 +12,7 @@ from pathlib import Path
 from types import FrameType
 from typing import Any
 
+from sim.execution import Execution, Planning, planned_tilt
 from sim.files import check_new_folder, finite, write_json
 from sim.judge import Judge
 from sim.loop import ClosedLoop, DivergedError
@@ -44,6 +45,7 @@ class Request:
         live: Whether to open a viewer that follows the run (with ``out`` only).
         anyway: Whether to run although the synthesis finds no forces somewhere on the path.
         world: What is true of the plant beyond the scenario; nothing else by default.
+        planning: How the tilt is planned; None for the scenario's own timing.
     """
 
     scenario: Scenario
@@ -54,6 +56,7 @@ class Request:
     live: bool = False
     anyway: bool = False
     world: World = NO_DEVIATION
+    planning: Planning | None = None
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -70,6 +73,7 @@ def execute(
     request: Request,
     progress: Progress | None = None,
     prepared: Preparation | None = None,
+    execution: Execution | None = None,
 ) -> Result:
     """Runs to the end, or until interrupted (SIGINT, SIGTERM), and leaves a complete record.
 
@@ -77,26 +81,33 @@ def execute(
         request: What to run.
         progress: Called with steps done and steps in total after every block.
         prepared: What :func:`prepare` gives for the request, where that has been done already.
+        execution: The planned tilt, where the request's planning has been done already.
 
     Raises:
         PathError: The arms cannot follow the path; nothing has moved.
         InvalidInputError: The scenario contradicts itself, or the folder holds something.
         UnholdableError: The synthesis finds no forces somewhere on the path, and the request does
             not say to run anyway.
+        PlanError: The planned tilt breaks a limit.
         DivergedError: The simulation diverged in its first step.
     """
-    scenario, out = request.scenario, request.out
+    out = request.out
     if out is not None:
         check_new_folder("out", out)
-    if prepared is None:
-        prepared = prepare(scenario, request.control, check=not request.anyway)
+    if request.planning is not None:
+        execution = execution or planned_tilt(request.scenario, request.planning)
+        request = dataclasses.replace(request, scenario=execution.scenario)
+        prepared = Preparation(execution.joint_path, execution.grip)
+    elif prepared is None:
+        prepared = prepare(request.scenario, request.control, check=not request.anyway)
     loop = ClosedLoop(
-        scenario,
+        request.scenario,
         request.control,
         seed=request.seed,
         joint_path=prepared.joint_path,
         world=request.world,
         grip=prepared.grip,
+        execution=execution,
     )
     monitor = Monitor(loop.truth)
     robot = loop.robot
@@ -112,7 +123,13 @@ def execute(
             write_json(out / CONFIG, config)
             limits = robot.tau_min, robot.tau_max
             recorder = Recorder(
-                out / RECORDING, loop.truth, config, robot.joints, *limits, viewer_url=viewer_url
+                out / RECORDING,
+                loop.truth,
+                config,
+                robot.joints,
+                *limits,
+                plan=None if execution is None else execution.plan,
+                viewer_url=viewer_url,
             )
         started = time.perf_counter()
         try:
@@ -179,6 +196,7 @@ def resolved_config(request: Request) -> dict[str, Any]:
             "control": dataclasses.asdict(request.control),
             "scenario": dataclasses.asdict(request.scenario),
             "world": dataclasses.asdict(request.world),
+            "planning": None if request.planning is None else dataclasses.asdict(request.planning),
             "versions": {name: version(name) for name in PACKAGES},
         }
     )

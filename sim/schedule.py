@@ -22,15 +22,18 @@ class Reference:
     Attributes:
         phase: Index of the phase.
         progress: How much of the phase's motion is done [-], 0 to 1.
-        rate: Derivative of the progress [1/s].
+        rate, acceleration: First and second derivatives of the progress [1/s, 1/s^2].
         tilt: [rad].
+        turn: Derivative of the tilt by the progress [rad].
         grip: Share of the synthesised forces [-].
     """
 
     phase: NDArray[np.intp]
     progress: Array
     rate: Array
+    acceleration: Array
     tilt: Array
+    turn: Array
     grip: Array
 
 
@@ -53,6 +56,8 @@ class Schedule:
         self._durations = np.array([phase.duration_s for phase in self.phases])
         self._shares_before = np.array([[phase.tilt, phase.grip] for phase in self._before])
         self._changes = [[p.tilt, p.grip] for p in self.phases] - self._shares_before
+        timings = [(i, phase.timing) for i, phase in enumerate(self.phases)]
+        self._timed = [(i, timing) for i, timing in timings if timing is not None]
         if np.count_nonzero(np.diff(np.concatenate([[0], self.held.astype(int)])) == 1) > 1:
             valid = "at most one stretch with full grip: drift counts from where it began"
             raise InvalidInputError("phases", [p.name for p in self.phases], valid)
@@ -69,18 +74,29 @@ class Schedule:
     def at(self, t: Array | float) -> Reference:
         """What is asked for at times t [s]; after the end, what the last phase ended with."""
         index = np.minimum(np.searchsorted(self.ends, t, side="right"), len(self.phases) - 1)
-        progress, rate = minimum_jerk((t - self.starts[index]) / self._durations[index])
+        elapsed, duration = t - self.starts[index], self._durations[index]
+        progress, rate, acceleration = minimum_jerk(elapsed / duration)
+        rate, acceleration = rate / duration, acceleration / duration**2
+        for phase, timing in self._timed:
+            own = index == phase
+            timed = timing.at(elapsed)
+            progress = np.where(own, timed[0], progress)
+            rate, acceleration = np.where(own, timed[1:], (rate, acceleration))
         share = self._shares_before[index] + self._changes[index] * np.expand_dims(progress, -1)
         return Reference(
             phase=index,
             progress=progress,
-            rate=rate / self._durations[index],
+            rate=rate,
+            acceleration=acceleration,
             tilt=self.end * share[..., 0],
+            turn=self.end * self._changes[index, 0],
             grip=share[..., 1],
         )
 
     def times(self, phase: int, progress: Array) -> Array:
         """When a phase reaches progresses that rise from 0 to 1, counted from its start [s]."""
+        if (timing := self.phases[phase].timing) is not None:
+            return timing.times(progress)
         x = np.linspace(0.0, 1.0, 10_001)
         return np.interp(progress, minimum_jerk(x)[0], x) * self.phases[phase].duration_s
 

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, fields, replace
 
 from sim.checks import length, not_negative, positive, whole
+from sim.timing import Timing
 from synthesis import InvalidInputError, Objective
 from synthesis.uncertainty_set import UncertaintySet
 
@@ -18,7 +20,7 @@ FARTHEST_M = 10.0
 
 @dataclass(frozen=True)
 class Phase:
-    """A stretch of the manoeuvre: what it brings tilt, hands and grip to, along minimum jerk.
+    """A stretch of the manoeuvre: what it brings tilt, hands and grip to.
 
     Attributes:
         name: What people call it.
@@ -26,6 +28,7 @@ class Phase:
         tilt: Share of the path's angle at the end [-], 0 to 1.
         gap: Distance of the tips from their contacts, along the outward normals, at the end [m].
         grip: Share of the synthesised forces that is applied at the end [-], 0 to 1.
+        timing: How it goes there, in that duration; None for minimum jerk.
     """
 
     name: str
@@ -33,6 +36,7 @@ class Phase:
     tilt: float
     gap: float
     grip: float
+    timing: Timing | None = None
 
     def __post_init__(self) -> None:
         where = f"phase {self.name}"
@@ -47,6 +51,9 @@ class Phase:
             raise InvalidInputError(f"{where}.gap", self.gap, valid)
         if self.gap > 0.0 and self.grip > 0.0:
             raise InvalidInputError(f"{where}.grip", self.grip, "0 while there is a gap")
+        if self.timing is not None and not math.isclose(self.duration_s, self.timing.duration):
+            valid = f"its timing's {self.timing.duration:g} s"
+            raise InvalidInputError(f"{where}.duration_s", self.duration_s, valid)
 
 
 STANDOFF = 0.06  # [m] of the hands from the object before and after they hold it
@@ -71,7 +78,7 @@ def stretched(phases: tuple[Phase, ...], duration_s: float) -> tuple[Phase, ...]
     """The phases with every one that tilts the object taking the given time [s]."""
     before = (0.0, *(phase.tilt for phase in phases))
     return tuple(
-        replace(phase, duration_s=duration_s) if phase.tilt != tilt else phase
+        replace(phase, duration_s=duration_s, timing=None) if phase.tilt != tilt else phase
         for phase, tilt in zip(phases, before, strict=False)
     )
 
@@ -153,6 +160,8 @@ class Control:
         yielding_squeeze: Whether the impedance leaves the hands' squeeze to the feed-forward.
         robustness: What the grip has to bear beyond the belief; None for the fixed margins of
             ``friction_factor`` and ``preload`` alone.
+        inertia: Whether forces and torques also accelerate object and robot as the path's timing
+            asks; else both are those of rest.
         pose_filter_s: Time constant with which the object's measured pose is smoothed [s].
         guard: When the run is held, lowered or stopped.
     """
@@ -166,6 +175,7 @@ class Control:
     bandwidth: float = 30.0
     yielding_squeeze: bool = False
     robustness: Robustness | None = None
+    inertia: bool = False
     pose_filter_s: float = 0.0
     guard: Guard = Guard()
 
@@ -188,7 +198,8 @@ def controllers(control: Control) -> dict[str, Control]:
     """The controllers by name, made from a scenario's own control.
 
     ``robust`` presses hard enough for every world of an uncertainty set, smooths the measured
-    pose and follows the path more stiffly; ``margin`` is the scenario's own control; ``paper`` is
+    pose and follows the path more stiffly; ``dynamic`` also makes the forces and torques that the
+    motion itself takes, for fast tilts; ``margin`` is the scenario's own control; ``paper`` is
     (17) as printed, with the full friction and no preload; ``no-feedforward`` applies joint
     impedance and gravity compensation alone.
     """
@@ -197,6 +208,14 @@ def controllers(control: Control) -> dict[str, Control]:
             control,
             robustness=_ROBUSTNESS,
             bandwidth=5.0 * control.bandwidth,
+            yielding_squeeze=True,
+            pose_filter_s=0.05,
+        ),
+        "dynamic": replace(
+            control,
+            inertia=True,
+            solve_every=1,
+            bandwidth=150.0,
             yielding_squeeze=True,
             pose_filter_s=0.05,
         ),
@@ -255,6 +274,7 @@ class Tolerances:
         spin_deg: Turn about the contact normal [deg].
         utilisation: Friction utilisation in the plant [-].
         force_error: RMS of measured minus commanded normal force over the peak commanded one [-].
+        saturated_s: How long a torque may be cut at its limit at a stretch [s].
     """
 
     final_deg: float = 0.1
@@ -263,7 +283,9 @@ class Tolerances:
     spin_deg: float = 0.1
     utilisation: float = 0.95
     force_error: float = 0.02
+    saturated_s: float = 0.0
 
     def __post_init__(self) -> None:
         for field in fields(self):
-            positive(f"tolerances.{field.name}", getattr(self, field.name))
+            check = not_negative if field.name == "saturated_s" else positive
+            check(f"tolerances.{field.name}", getattr(self, field.name))

@@ -10,6 +10,12 @@ from numpy.typing import NDArray
 from synthesis.contact import Array
 
 
+def stretches(flags: Array) -> NDArray[np.intp]:
+    """How many steps in a row a flag has been set at each step, (k,) of (k,)."""
+    steps = np.arange(1, len(flags) + 1)
+    return steps - np.maximum.accumulate(np.where(flags > 0.0, 0, steps))
+
+
 @dataclass(frozen=True, eq=False)
 class Trace:
     """Arrays over k steps, l joints, n hands and m contacts (hands first); SI units, world axes.
@@ -20,7 +26,7 @@ class Trace:
         t: (k,).
         phase: Index of the phase, (k,).
         mode: Number of the :class:`sim.guard.Mode`, (k,).
-        tilt_ref: Reference tilt [rad], (k,).
+        tilt_ref, rate_ref: Reference tilt [rad] and its rate [rad/s], (k,).
         tilt: Measured tilt [rad], (k,).
         p_WO, quat_WO, twist_WO: Object pose and twist (linear first), (k, 3 | 4 | 6).
         q, qd, q_ref: Joint state and reference, (k, l).
@@ -39,6 +45,7 @@ class Trace:
     phase: Array
     mode: Array
     tilt_ref: Array
+    rate_ref: Array
     tilt: Array
     p_WO: Array
     quat_WO: Array
@@ -61,7 +68,17 @@ class Trace:
     @staticmethod
     def allocate(steps: int, joints: int, hands: int, contacts: int) -> Trace:
         """An all-zero trace, to be filled row by row."""
-        numbers = "t", "phase", "mode", "tilt_ref", "tilt", "synthesis_s", "failed", "collisions"
+        numbers = [
+            "t",
+            "phase",
+            "mode",
+            "tilt_ref",
+            "rate_ref",
+            "tilt",
+            "synthesis_s",
+            "failed",
+            "collisions",
+        ]
         shapes = {
             **dict.fromkeys(numbers, ()),
             **dict.fromkeys(("q", "qd", "q_ref", "tau", "saturated"), (joints,)),

@@ -153,7 +153,7 @@ WORDS = st.text(st.characters(codec="utf-8", exclude_characters="\0"), max_size=
 BAD_VALUES = {
     "--duration": st.sampled_from(["nan", "-inf", "0", "-1e-9", "1e9", "8s", "", "1,5", "0x1p3"]),
     "--seed": st.sampled_from(["-1", "1.0", "1e3", "", "one", "-99999999999999999999"]),
-    "--controller": WORDS.filter(lambda w: w not in controllers(Control())),
+    "--controller": WORDS.filter(lambda w: w not in [*controllers(Control()), "None"]),
     "--objective": WORDS.filter(lambda w: w not in [*Objective, "None"]),
     "--out": st.sampled_from(["file", "full", "file/x", "full/thing/y", "."]),
     "--at": st.sampled_from(["noon", ""]),

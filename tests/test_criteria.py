@@ -7,7 +7,8 @@ import numpy as np
 import pytest
 
 from sim.robot import RobotModel
-from sim.sweep.criteria import Criteria, stretches, violations
+from sim.sweep.criteria import Criteria, violations
+from sim.trace import stretches
 from synthesis import InvalidInputError
 from tests.short_run import EDGE_LEFT, GRIP_ROW, LAST, LEFT, ROW, SCENARIO, changed, short_run
 

@@ -204,7 +204,7 @@ def test_the_blueprint_shows_the_scene_every_curve_and_the_texts(content, record
             kind = batch["ViewBlueprint:class_identifier"].to_pylist()[0][0]
             views.add((kind, batch["ViewBlueprint:space_origin"].to_pylist()[0][0].strip("/")))
     curves = {("TimeSeries", e) for e in content.entities if e.startswith("plots/")}
-    assert len(curves) == 7
+    assert len(curves) == 8
     texts = {("TextDocument", "verdict"), ("TextDocument", "config")}
     assert views == curves | texts | {("3D", ""), ("StateTimeline", "phase")}
 

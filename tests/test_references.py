@@ -12,10 +12,13 @@ TIMESTEP = 0.001
 
 
 def directly(path, t):
-    """Tilt, grip, angles and speeds at a time, from schedule and joint path."""
+    """Tilt, grip, angles and their derivatives at a time, from schedule and joint path."""
     asked = path.schedule.at(t)
     q, slope = path.at(int(asked.phase), float(asked.progress))
-    return int(asked.phase), asked.tilt, asked.grip, q, slope * asked.rate
+    curvature = path.curvature(int(asked.phase), float(asked.progress))
+    qdd = slope * asked.acceleration + curvature * asked.rate**2
+    rate, acceleration = asked.turn * asked.rate, asked.turn * asked.acceleration
+    return int(asked.phase), asked.tilt, asked.grip, q, slope * asked.rate, rate, acceleration, qdd
 
 
 @pytest.mark.parametrize("name", NAMES)
@@ -39,3 +42,26 @@ def test_times_off_the_clock_and_after_the_end_are_computed():
             np.testing.assert_array_equal(got, expected)
     # Another time is told apart: the table is not one row for all.
     assert not np.array_equal(references.at(5.0).q, references.at(6.0).q)
+
+
+def test_speeds_and_accelerations_are_derivatives_by_time():
+    path, h = plan_joints(scenario("box-tilt")), 1e-4
+    references = References(path, TIMESTEP)
+    for t in (3.91037, 7.00061):
+        before, now, after = (references.at(t + dt) for dt in (-h, 0.0, h))
+        # Central differences: h^2 / 6 of the third derivative.
+        np.testing.assert_allclose(now.rate, (after.tilt - before.tilt) / (2 * h), rtol=1e-6)
+        np.testing.assert_allclose(now.qdd, (after.qd - before.qd) / (2 * h), rtol=0, atol=1e-5)
+        change = (after.rate - before.rate) / (2 * h)
+        np.testing.assert_allclose(now.acceleration, change, rtol=1e-6)
+        assert abs(now.acceleration) > 0.01
+
+
+def test_a_slower_clock_slows_all_of_the_motion():
+    at_half = References(plan_joints(scenario("box-tilt")), TIMESTEP).at(5.0).on_clock(0.5, 2.0)
+    full = References(plan_joints(scenario("box-tilt")), TIMESTEP).at(5.0)
+    assert at_half.tilt == full.tilt
+    assert at_half.rate == 0.5 * full.rate
+    assert at_half.acceleration == pytest.approx(0.25 * full.acceleration + 2.0 * full.rate)
+    np.testing.assert_allclose(at_half.qd, 0.5 * full.qd, rtol=1e-15)
+    np.testing.assert_allclose(at_half.qdd, 0.25 * full.qdd + 2.0 * full.qd, rtol=1e-14)

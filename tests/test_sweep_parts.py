@@ -91,7 +91,7 @@ def test_hand_friction_is_that_of_the_hands_and_support_friction_the_rest():
 @pytest.mark.parametrize(
     ("changes", "said"),
     [
-        ({"controllers": ()}, "one or more of robust, margin"),
+        ({"controllers": ()}, "one or more of robust, dynamic, margin"),
         ({"controllers": ("margin", "margin")}, "each once"),
         ({"controllers": ("pid",)}, "pid"),
         ({"preset": "moon"}, "nominal, lab, field, harsh"),

@@ -12,6 +12,7 @@ _BACKGROUND = (222, 226, 232)
 
 _CURVES = (
     ("tilt", "Tilt [deg]", rrb.Corner2D.RightBottom),
+    ("tilt_rate", "Tilt rate [deg/s]", rrb.Corner2D.RightTop),
     ("tilt_error", "Tilt error [deg]", rrb.Corner2D.RightBottom),
     ("normal_force", "Normal force [N]", rrb.Corner2D.RightTop),
     ("utilisation", "Friction utilisation [-]", rrb.Corner2D.RightTop),

@@ -14,6 +14,8 @@ from rerun.components import AggregationPolicy
 from sim.contacts import true_contacts
 from sim.guard import Mode
 from sim.monitor import ContactHistory
+from sim.path import ScrewPath
+from sim.plan import Plan
 from sim.recording.blueprint import TIMELINE, blueprint
 from sim.recording.columns import arrows, scalars, strips
 from sim.recording.scenery import Scenery
@@ -54,6 +56,7 @@ class Recorder:
         joints: tuple[str, ...],
         tau_min: Array,
         tau_max: Array,
+        plan: Plan | None = None,
         viewer_url: str | None = None,
     ) -> None:
         """Opens the file and writes everything that does not change.
@@ -65,11 +68,13 @@ class Recorder:
             joints: Names of the l driven joints.
             tau_min: Torque limits [N·m or N], (l,).
             tau_max: Torque limits [N·m or N], (l,).
+            plan: Of the tilt, shown beside what is measured; None if it is not planned.
             viewer_url: A viewer that follows the run.
         """
         self._scenario = scenario
         self._cones = np.array([_cone(contact.mu) for contact in true_contacts(scenario)])
         self._tau_min, self._tau_max = tau_min, tau_max
+        self._plan, self._axis = plan, ScrewPath(scenario.path).axis
         self._stride = max(1, round(_POSE_PERIOD / scenario.physics.timestep))
         # Viewers keep the first blueprint they see per application id.
         self._recording = rr.RecordingStream(f"fulcrum {scenario.name}")
@@ -94,13 +99,23 @@ class Recorder:
         bright = colors(len(names))
         pale = [_pale(color) for color in bright]
         limit = [(120, 120, 120)] * 2
+        joint_colors = colors(len(joints))
+        if self._plan is not None:
+            paler = [_pale(color) for color in pale]
+            for path, series, palette in (
+                ("normal_force", list(names), paler),
+                ("torque", list(joints), [_pale(color) for color in joint_colors]),
+            ):
+                lines = rr.SeriesLines(names=[f"{n} planned" for n in series], colors=palette)
+                self._recording.log(f"plots/{path}/planned", lines, static=True)
         for path, series, palette in (
             ("tilt", ["reference", "measured"], [_pale(bright[0]), bright[0]]),
+            ("tilt_rate", ["reference", "measured"], [_pale(bright[0]), bright[0]]),
             ("tilt_error", ["measured - reference"], bright[:1]),
             ("normal_force", forces, [*pale, *bright]),
             ("utilisation", list(names), bright),
             ("slip", list(names), bright),
-            ("torque", [*joints, "lower limit", "upper limit"], [*colors(len(joints)), *limit]),
+            ("torque", [*joints, "lower limit", "upper limit"], [*joint_colors, *limit]),
             ("synthesis", ["synthesis"], bright[:1]),
         ):
             lines = rr.SeriesLines(
@@ -124,22 +139,38 @@ class Recorder:
         tilt = np.degrees(np.column_stack([block.tilt_ref, block.tilt]))
         self._send("tilt", time, tilt)
         self._send("tilt_error", time, tilt[:, 1:] - tilt[:, :1])
+        rate = np.column_stack([block.rate_ref, block.twist_WO[:, 3:] @ self._axis])
+        self._send("tilt_rate", time, np.degrees(rate))
         normal = np.column_stack([block.w_command_C[..., N], history.w_OC_C[..., N]])
         self._send("normal_force", time, normal)
         self._send("utilisation", time, np.where(history.kept, history.utilisation, 0.0))
         self._send("slip", time, 1e3 * history.slip)
-        share = np.maximum(block.tau / self._tau_max, block.tau / self._tau_min)
         limits = np.broadcast_to([-1.0, 1.0], (len(block), 2))
-        self._send("torque", time, np.column_stack([share * np.sign(block.tau), limits]))
+        self._send("torque", time, np.column_stack([self._shares(block.tau), limits]))
         due = block.synthesis_s > 0.0
         if due.any():
             solves = rr.TimeColumn(TIMELINE, duration=block.t[due])
             self._send("synthesis", solves, 1e6 * block.synthesis_s[due, None])
+        self._send_plan(block)
         self._send_phases(block)
         self._send_scene(block, history)
 
     def _send(self, path: str, time: rr.TimeColumn, values: Array) -> None:
         self._recording.send_columns(f"plots/{path}", [time], scalars(values))
+
+    def _shares(self, tau: Array) -> Array:
+        """Torques over their limits, with their sign."""
+        return np.maximum(tau / self._tau_max, tau / self._tau_min) * np.sign(tau)
+
+    def _send_plan(self, block: Trace) -> None:
+        """What was planned for the tilts of the rows, while the path moves."""
+        moving = block.rate_ref != 0.0
+        if self._plan is None or not moving.any():
+            return
+        time = rr.TimeColumn(TIMELINE, duration=block.t[moving])
+        along = self._plan.along(block.tilt_ref[moving])
+        self._send("normal_force/planned", time, along.w_OC_C[..., N])
+        self._send("torque/planned", time, self._shares(along.tau))
 
     def _send_phases(self, block: Trace) -> None:
         """Marks the rows at which a phase begins, or what the run does in it changes."""

@@ -5,14 +5,13 @@ from __future__ import annotations
 from dataclasses import dataclass, fields
 
 import numpy as np
-from numpy.typing import NDArray
 
 from sim.checks import positive
 from sim.run import Result
 from sim.scenario import Scenario
 from sim.schedule import Schedule
-from sim.trace import Trace
-from synthesis.contact import Array, Mask
+from sim.trace import Trace, stretches
+from synthesis.contact import Mask
 
 
 @dataclass(frozen=True)
@@ -89,12 +88,6 @@ def violations(
     if result.error is not None:
         found.append(Violation(end, "error"))
     return tuple(sorted(found, key=lambda violation: (violation.t, violation.text)))
-
-
-def stretches(flags: Array) -> NDArray[np.intp]:
-    """How many steps in a row a flag has been set at each step, (k,) of (k,)."""
-    steps = np.arange(1, len(flags) + 1)
-    return steps - np.maximum.accumulate(np.where(flags > 0.0, 0, steps))
 
 
 def _first(trace: Trace, mask: Mask, category: str, where: str) -> list[Violation]:

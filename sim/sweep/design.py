@@ -10,6 +10,7 @@ from importlib.metadata import version
 from typing import Any
 
 from sim.checks import whole
+from sim.execution import LEAST_TIME, Planning
 from sim.files import finite
 from sim.run import PACKAGES
 from sim.scenario import Scenario
@@ -58,6 +59,7 @@ class Sweep:
         seed: Of the first; the next have the next.
         grid: What is set of the drawn worlds.
         criteria: What counts as success.
+        planning: How the tilt is planned, where the scenario is that of a planned tilt; else None.
     """
 
     scenario: Scenario
@@ -67,6 +69,7 @@ class Sweep:
     seed: int = 0
     grid: Grid = ()
     criteria: Criteria = Criteria()
+    planning: Planning | None = None
 
     def __post_init__(self) -> None:
         known = controllers(self.scenario.control)
@@ -110,6 +113,8 @@ class Sweep:
             f"fulcrum run {self.scenario.name} --controller {episode.controller}",
             f"--preset {self.preset} --seed {episode.seed}",
         ]
+        if self.planning is not None:
+            words.append(f"--plan {LEAST_TIME} --stretch {self.planning.stretch!r}")
         if episode.values:
             words.append("--world " + ",".join(f"{n}={v!r}" for n, v in episode.values))
         return " ".join(words)
@@ -127,6 +132,7 @@ class Sweep:
                 "seed": self.seed,
                 "grid": {name: list(values) for name, values in self.grid},
                 "criteria": dataclasses.asdict(self.criteria),
+                "planning": None if self.planning is None else dataclasses.asdict(self.planning),
                 "versions": {name: version(name) for name in PACKAGES},
             }
         )

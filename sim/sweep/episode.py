@@ -9,6 +9,7 @@ from collections.abc import Mapping, Sequence
 from functools import lru_cache
 from typing import Any
 
+from sim.execution import Execution, planned_tilt
 from sim.files import finite
 from sim.ik import plan_joints
 from sim.preparation import Preparation, prepare
@@ -16,9 +17,10 @@ from sim.robot import RobotModel
 from sim.run import Request, Result, execute
 from sim.scenario import Scenario
 from sim.settings import Control, controllers
-from sim.sweep.criteria import stretches, violations
+from sim.sweep.criteria import violations
 from sim.sweep.design import Episode, Sweep
 from sim.sweep.parameters import PARAMETERS
+from sim.trace import stretches
 from sim.world import World
 
 Row = dict[str, Any]
@@ -31,13 +33,16 @@ class Prepared:
     Attributes:
         sweep: The sweep.
         controls: Settings by controller.
-        preparations: What is planned, by controller; the truth does not change it.
+        preparations: What is planned, by controller; the truth does not change it. None in a sweep
+            of a planned tilt.
+        execution: The planned tilt, if it is planned.
         joints: Names of the robot's joints.
     """
 
     sweep: Sweep
     controls: dict[str, Control]
     preparations: dict[str, Preparation]
+    execution: Execution | None
     joints: tuple[str, ...]
 
 
@@ -51,14 +56,17 @@ def prepared(packed: bytes) -> Prepared:
     sweep: Sweep = pickle.loads(packed)
     known = controllers(sweep.scenario.control)
     controls = {name: known[name] for name in sweep.controllers}
-    path = plan_joints(sweep.scenario)
+    planned = None if sweep.planning is None else planned_tilt(sweep.scenario, sweep.planning)
+    path = None if planned else plan_joints(sweep.scenario)
     return Prepared(
         sweep=sweep,
         controls=controls,
         preparations={
             name: prepare(sweep.scenario, control, check=False, joint_path=path)
             for name, control in controls.items()
+            if planned is None
         },
+        execution=planned,
         joints=RobotModel(sweep.scenario).joints,
     )
 
@@ -70,6 +78,8 @@ def check_holdable(sweep: Sweep) -> None:
         PathError: The arms cannot follow the path.
         UnholdableError: A controller finds no forces somewhere on the path.
     """
+    if sweep.planning is not None:
+        return  # there is a plan, or there would be no sweep of it
     known = controllers(sweep.scenario.control)
     for name in sweep.controllers:
         prepare(sweep.scenario, known[name])
@@ -98,9 +108,17 @@ def run_episode(packed: bytes, episode: Episode) -> Row:
         "replay": sweep.replay(episode),
         **_truths(world, sweep.scenario, shared.joints),
     }
-    request = Request(sweep.scenario, episode.controller, control, episode.seed, world=world)
+    request = Request(
+        sweep.scenario,
+        episode.controller,
+        control,
+        episode.seed,
+        world=world,
+        planning=sweep.planning,
+    )
     try:
-        result = execute(request, prepared=shared.preparations[episode.controller])
+        preparation = shared.preparations.get(episode.controller)
+        result = execute(request, prepared=preparation, execution=shared.execution)
     except Exception as error:  # whatever ends an episode is its failure, not the sweep's
         text = f"{type(error).__name__}: {error}"
         row |= {"cause": "error", "category": "error", "failed_at_s": 0.0, "error": text}
