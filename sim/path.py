@@ -36,8 +36,6 @@ class ScrewPath:
             ("point_W", pivot.point_W),
             ("pitch", pivot.pitch),
             ("travel", pivot.travel),
-            ("start.position", pivot.start.position),
-            ("start.quaternion", pivot.start.quaternion),
         ):
             if not np.isfinite(value).all():
                 raise InvalidInputError(f"path.{name}", value, "finite numbers")

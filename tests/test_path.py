@@ -164,13 +164,20 @@ def test_an_angle_that_cannot_be_followed_is_refused(angle_deg):
     [
         ("point_W", {"point_W": (np.nan, 0.0, 0.0)}),
         ("pitch", {"pitch": np.inf}),
-        ("start.position", {"start": Pose((0.0, -np.inf, 0.0))}),
-        ("start.quaternion", {"start": Pose(quaternion=(np.nan, 0.0, 0.0, 0.0))}),
     ],
 )
 def test_a_path_that_is_no_number_is_refused_by_name(field, change):
     with pytest.raises(InvalidInputError, match=rf"path\.{field}: got .*; valid is finite numbers"):
         ScrewPath(replace(scenario("box-tilt").path, **change))
+
+
+def test_a_pose_that_is_no_number_is_refused_by_name():
+    for name, numbers in (
+        ("position", (0.0, -np.inf, 0.0)),
+        ("quaternion", (np.nan, 0.0, 0.0, 0.0)),
+    ):
+        with pytest.raises(InvalidInputError, match=rf"pose\.{name}: got .*; valid is"):
+            Pose(**{name: numbers})
 
 
 # --- the tilt that is read back ---
