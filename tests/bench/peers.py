@@ -138,6 +138,9 @@ class Qoco:
         return self.solver.solve()
 
     def value(self, result, problem):
+        # From one pose to a distant one an update sometimes ends "inaccurate", far off.
+        if str(result.status) != "QOCO_SOLVED":
+            return np.nan
         return self.matrices.value(result.x, problem)
 
 
