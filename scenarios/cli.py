@@ -29,7 +29,7 @@ from scenarios.planning import Plan
 from scenarios.sweep import Sweep
 
 if TYPE_CHECKING:
-    from sim.execution import Execution
+    from sim.preparation import Preparation
     from sim.report import Report
     from sim.run import Request
 
@@ -111,10 +111,10 @@ class Run:
         from sim.run import execute as run
 
         try:
-            request, planned = self._request()
+            request, prepared = self._request()
             assert request.out is not None
             with progress_bar(self.scenario) as progress:
-                result = run(request, progress, execution=planned)
+                result = run(request, progress, prepared)
         except UnholdableError as error:
             console, controller = Console(highlight=False), self.controller or "robust"
             print_explanation(console, error.explanation, controller)
@@ -130,17 +130,18 @@ class Run:
         codes = {Verdict.PASS: PASSED, Verdict.FAIL: FAILED, Verdict.INTERRUPTED: INTERRUPTED}
         return codes[report.verdict]
 
-    def _request(self) -> tuple[Request, Execution | None]:
-        """What to run, and its planned tilt, if it is to be planned."""
+    def _request(self) -> tuple[Request, Preparation | None]:
+        """What to run, and what is prepared of it: a planned tilt, if there is to be one."""
         from scenarios import scenario
         from scenarios.sweep import drawn_world
         from sim.execution import planned_tilt
+        from sim.preparation import Preparation
         from sim.run import Request
         from sim.settings import stretched
         from synthesis.errors import InvalidInputError
 
         chosen = scenario(self.scenario)
-        planning, planned = chosen_planning(self.plan, self.stretch), None
+        planning, prepared = chosen_planning(self.plan, self.stretch), None
         controller = "robust" if planning is None else "dynamic"
         if self.controller is not None:
             controller = self.controller
@@ -150,7 +151,7 @@ class Run:
                 valid = "left out with --plan, which --stretch prolongs"
                 raise InvalidInputError("--duration", self.duration, valid)
             planned = planned_tilt(chosen, planning)
-            chosen = planned.scenario
+            chosen, prepared = planned.scenario, Preparation.of(planned)
         elif self.duration is not None:
             chosen = replace(chosen, phases=stretched(chosen.phases, self.duration))
         if self.seed < 0:
@@ -162,7 +163,7 @@ class Run:
         request = Request(
             chosen, controller, control, self.seed, out, self.live, self.anyway, world, planning
         )
-        return request, planned
+        return request, prepared
 
 
 @dataclass(frozen=True)

@@ -77,9 +77,8 @@ class Explain:
         print_explanation(Console(highlight=False), explanation, self.controller)
         content = dataclasses.asdict(explanation)
         if explanation.feasible and control.robustness is not None:
-            bears = {
-                tilt: found.factor for tilt, found in borne(chosen, control, _BORNE_DEG).items()
-            }
+            scalings = borne(chosen, control, _BORNE_DEG, problems.joint_path)
+            bears = {tilt: scaling.factor for tilt, scaling in scalings.items()}
             _print_borne(Console(highlight=False), bears)
             content["uncertainty_borne"] = bears
         if self.json is not None:

@@ -6,13 +6,16 @@ import contextlib
 from collections.abc import Iterator
 from dataclasses import replace
 from datetime import datetime
+from enum import StrEnum
 from pathlib import Path
-from typing import TYPE_CHECKING, Protocol
+from typing import TYPE_CHECKING, Protocol, TypeVar
 
 if TYPE_CHECKING:
     from sim.execution import Planning
     from sim.scenario import Scenario
     from sim.settings import Control
+
+Kind = TypeVar("Kind", bound=StrEnum)
 
 PASSED, FAILED, BAD_INPUT, INTERRUPTED = 0, 1, 2, 130
 
@@ -33,9 +36,20 @@ def chosen_control(scenario: Scenario, controller: str, objective: str | None) -
     control = known[controller]
     if objective is None:
         return control
-    if objective not in list(Objective):
-        raise InvalidInputError("--objective", objective, f"one of {', '.join(Objective)}")
-    return replace(control, objective=Objective(objective))
+    return replace(control, objective=one_of(Objective, "--objective", objective))
+
+
+def one_of(kind: type[Kind], option: str, text: str) -> Kind:
+    """The member of an enumeration that an option names.
+
+    Raises:
+        InvalidInputError: It names none.
+    """
+    from synthesis.errors import InvalidInputError
+
+    if text not in list(kind):
+        raise InvalidInputError(option, text, f"one of {', '.join(kind)}")
+    return kind(text)
 
 
 def chosen_planning(plan: str | None, stretch: float) -> Planning | None:
@@ -98,6 +112,11 @@ def results_folder(out: Path | None, name: str) -> Path:
     """
     from sim.files import check_new_folder
 
-    folder = out or Path("logs") / f"{name}-{datetime.now():%Y%m%d-%H%M%S}"
+    folder = out or dated_folder(name)
     check_new_folder("--out", folder)
     return folder
+
+
+def dated_folder(name: str) -> Path:
+    """logs/NAME-TIME."""
+    return Path("logs") / f"{name}-{datetime.now():%Y%m%d-%H%M%S}"

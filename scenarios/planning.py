@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 import tyro
 
-from scenarios.common import FAILED, PASSED, results_folder
+from scenarios.common import FAILED, PASSED, one_of, results_folder
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -104,21 +104,13 @@ class Plan:
 
     def _asked(self, chosen: Scenario) -> tuple:
         """The objective and the longest duration [s]."""
-        from synthesis.errors import InvalidInputError
+        from sim.settings import tilting
         from synthesis.path_problem import PathObjective
 
-        if self.objective not in list(PathObjective):
-            valid = f"one of {', '.join(PathObjective)}"
-            raise InvalidInputError("--objective", self.objective, valid)
-        objective = PathObjective(self.objective)
+        objective = one_of(PathObjective, "--objective", self.objective)
         if self.duration is not None:
             return objective, self.duration
-        shares = (0.0, *(phase.tilt for phase in chosen.phases))
-        own = sum(
-            phase.duration_s
-            for phase, before in zip(chosen.phases, shares, strict=False)
-            if phase.tilt > before
-        )
+        own = sum(chosen.phases[i].duration_s for i in tilting(chosen.phases))
         return objective, own if objective.needs_duration else math.inf
 
     def _margins(self, chosen: Scenario) -> Margins:

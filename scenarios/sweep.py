@@ -7,13 +7,19 @@ import shlex
 import sys
 import time
 from dataclasses import dataclass
-from datetime import datetime
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import tyro
 
-from scenarios.common import FAILED, INTERRUPTED, PASSED, chosen_planning, progress_bar
+from scenarios.common import (
+    FAILED,
+    INTERRUPTED,
+    PASSED,
+    chosen_planning,
+    dated_folder,
+    progress_bar,
+)
 
 if TYPE_CHECKING:
     from sim.run import Result
@@ -84,7 +90,8 @@ class Sweep:
             print(error)
             return FAILED
         pair = self._map(sweep)
-        store = Store(sweep, self._folder())
+        folder = self.out or dated_folder(f"sweep-{self.scenario}-{self.preset}")
+        store = Store(sweep, folder)
         before, started = len(store.missing()), time.perf_counter()
         try:
             with progress_bar(self.scenario) as move:
@@ -171,10 +178,6 @@ class Sweep:
         if len(set(names)) != 2 or len(names) != 2:
             raise InvalidInputError("--map", self.map, "two parameters, like mass,friction")
         return names[0], names[1]
-
-    def _folder(self) -> Path:
-        name = f"sweep-{self.scenario}-{self.preset}-{datetime.now():%Y%m%d-%H%M%S}"
-        return self.out or Path("logs") / name
 
     def _again(self, folder: Path) -> str:
         """The command that goes on with this sweep."""

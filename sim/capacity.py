@@ -184,9 +184,7 @@ def confirm(
         PathError: The arms cannot follow the path.
     """
     thing, weight = scenario.object, share * capacity
-    ratio = weight / (thing.mass * GRAVITY)
-    x, y, z = thing.inertia
-    heavy = replace(thing, mass=ratio * thing.mass, inertia=(ratio * x, ratio * y, ratio * z))
+    heavy = thing.weighing(weight / (thing.mass * GRAVITY))
     request = Request(replace(scenario, object=heavy), controller, control, anyway=True)
     report = execute(request, progress).report
     return Trial(

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from dataclasses import fields
+from typing import Any
 
 from synthesis import InvalidInputError
 
@@ -21,6 +23,12 @@ def not_negative(field: str, value: float) -> None:
     """Refuses what is not a finite number >= 0."""
     if not (math.isfinite(value) and value >= 0.0):
         raise InvalidInputError(field, value, "a finite number >= 0")
+
+
+def each(prefix: str, config: Any, check: Callable[[str, float], None]) -> None:
+    """Checks every field of a dataclass of numbers, named with a prefix."""
+    for field in fields(config):
+        check(f"{prefix}.{field.name}", getattr(config, field.name))
 
 
 def finite(field: str, vector: Sequence[float]) -> None:

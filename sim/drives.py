@@ -6,10 +6,9 @@ r"""The drives: joint impedance at the physics' rate along the path, and the for
 
 with :math:`f^*` the forces of the last setpoint that has arrived, s the share of grip that the
 schedule asks for and D the joints' viscous friction; what is in brackets only where the control
-counts with inertia. The mass matrix M gives every joint, light or
-heavy, the same bandwidth :math:`\omega`: damping that is explicit in time stays stable on light
-wrists. A joint whose encoder is dead has no impedance. Whatever comes in, what goes out is finite
-and within the limits.
+counts with inertia. The mass matrix M gives every joint, light or heavy, the same bandwidth
+:math:`\omega`: damping that is explicit in time stays stable on light wrists. A joint whose encoder
+is dead has no impedance. Whatever comes in, what goes out is finite and within the limits.
 
 A stiff impedance would also oppose the squeeze, by which the hands sink into what they hold. So
 that the force there is the one asked for, it leaves the squeeze to the feed-forward: with J_n the

@@ -22,7 +22,7 @@ from sim.plan import Plan, plan
 from sim.plan_problem import own_margins
 from sim.scenario import Scenario
 from sim.schedule import Schedule
-from sim.settings import Phase, Tolerances, stretched
+from sim.settings import Phase, Tolerances, stretched, tilting
 from sim.timing import Timing
 from synthesis import InvalidInputError
 from synthesis.contact import N
@@ -75,7 +75,7 @@ class Execution:
     @property
     def phase(self) -> int:
         """Index of the phase that tilts."""
-        return _tilting(self.scenario.phases)
+        return _whole_tilt(self.scenario.phases)
 
 
 def planned_tilt(scenario: Scenario, planning: Planning) -> Execution:
@@ -119,14 +119,13 @@ def timed(phases: tuple[Phase, ...], timing: Timing) -> tuple[Phase, ...]:
     Raises:
         InvalidInputError: There is not one phase that does the whole tilt.
     """
-    index = _tilting(phases)
+    index = _whole_tilt(phases)
     phase = replace(phases[index], duration_s=timing.duration, timing=timing)
     return (*phases[:index], phase, *phases[index + 1 :])
 
 
-def _tilting(phases: tuple[Phase, ...]) -> int:
-    before = (0.0, *(phase.tilt for phase in phases))
-    turns = [i for i, phase in enumerate(phases) if phase.tilt != before[i]]
+def _whole_tilt(phases: tuple[Phase, ...]) -> int:
+    turns = tilting(phases)
     if len(turns) != 1 or phases[turns[0]].tilt != 1.0:
         given = [phases[i].name for i in turns]
         raise InvalidInputError("phases that tilt", given, "one, which does the whole tilt")

@@ -9,6 +9,7 @@ import mujoco
 import numpy as np
 
 from sim.guard import Cause, Finding
+from sim.path import ScrewPath
 from sim.plant import Measurement
 from sim.references import Target
 from sim.robot import RobotModel
@@ -54,7 +55,7 @@ class Health:
         """Takes over thresholds, the belief, and the joints' start [rad or m], (l,)."""
         self._settings, self._robot = settings, robot
         self._hands = tuple(hand.name for hand in scenario.hands)
-        self._twist = _twist_of(scenario)
+        self._path = ScrewPath(scenario.path)
         inward = np.array([hand.normal_O for hand in scenario.hands]).reshape(-1, 3)
         places = np.array([hand.p_OC_O for hand in scenario.hands]).reshape(-1, 3)
         self._p_OT_O = places - robot.tip_radii[:, None] * inward
@@ -198,8 +199,8 @@ class Health:
                 return []
             what = "is frozen" if tracked else "gives no usable number"
             return [Finding(Cause.POSE, f"the tracking of the object {what}")]
-        w, along = self._twist.dot(measurement.quat_WO).tolist()
-        error = math.remainder(2.0 * math.atan2(along, w) - target.tilt, 2.0 * math.pi)
+        tilt = float(self._path.tilt(measurement.quat_WO))
+        error = math.remainder(tilt - target.tilt, 2.0 * math.pi)
         share = min(1.0, max(0.0, (t - self._checked) / _FILTER_S))
         self._tilt_error += share * (error - self._tilt_error)
         if not held:
@@ -227,20 +228,3 @@ def _tracked(measurement: Measurement) -> bool:
     """Whether the tracking of the object gives numbers that can be a pose."""
     p_WO, quat_WO = measurement.p_WO, measurement.quat_WO
     return bool(p_WO.dot(p_WO) < _PLAUSIBLE**2 and 0.0 < quat_WO.dot(quat_WO) < _PLAUSIBLE**2)
-
-
-def _twist_of(scenario: Scenario) -> Array:
-    r"""Rows whose products with a quaternion are cosine and sine of half the tilt, (2, 4).
-
-    With :math:`q_0` the start and a the axis, :math:`q q_0^{-1}` has the real part
-    :math:`\cos(\theta/2)` and, along a, the part :math:`\sin(\theta/2)`; both are linear in q.
-    """
-    inverse, turn = np.zeros(4), np.zeros(4)
-    start = np.asarray(scenario.path.start.quaternion, float)
-    mujoco.mju_negQuat(inverse, start / np.linalg.norm(start))
-    axis = np.asarray(scenario.path.axis_W, float)
-    rows = np.empty((2, 4))
-    for i, unit in enumerate(np.eye(4)):
-        mujoco.mju_mulQuat(turn, unit, inverse)
-        rows[:, i] = turn[0], turn[1:] @ axis / np.linalg.norm(axis)
-    return rows

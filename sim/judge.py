@@ -21,7 +21,7 @@ from sim.report import (
 )
 from sim.scenario import Scenario
 from sim.schedule import Schedule
-from sim.trace import Trace, stretches
+from sim.trace import Trace, stretches, torque_shares
 from synthesis.contact import Array, Mask, N
 
 # Reactions after which a manoeuvre is not completed.
@@ -104,7 +104,7 @@ class Judge:
         )
 
     def _torque(self, trace: Trace) -> TorqueReport:
-        share = np.maximum(trace.tau / self._tau_max, trace.tau / self._tau_min)
+        share = torque_shares(trace.tau, self._tau_min, self._tau_max)
         worst = int(np.argmax(share.max(axis=0)))
         return TorqueReport(
             max_utilisation=float(share.max()),

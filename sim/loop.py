@@ -10,7 +10,6 @@ from dm_control.rl.control import PhysicsError
 from sim.channel import Channel
 from sim.contacts import ContactFrames
 from sim.controller import Controller
-from sim.execution import Execution
 from sim.grip import GripSchedule
 from sim.guard import Event
 from sim.ik import JointPath, plan_joints
@@ -55,7 +54,7 @@ class ClosedLoop:
         joint_path: JointPath | None = None,
         world: World = NO_DEVIATION,
         grip: GripSchedule | None = None,
-        execution: Execution | None = None,
+        replanner: Replanner | None = None,
     ) -> None:
         """Plans the joint path, if need be, and sets up plant and controller.
 
@@ -67,7 +66,7 @@ class ClosedLoop:
             joint_path: The scenario's, where it is planned already.
             world: How the plant deviates from that, and what disturbs it; nothing by default.
             grip: What the control's robustness asks for, where it is planned already.
-            execution: The planned tilt, if it is planned; scenario, path and grip are then its own.
+            replanner: Plans the rest of a planned tilt anew where need be.
 
         Raises:
             InvalidInputError: The world does not fit the scenario.
@@ -75,11 +74,6 @@ class ClosedLoop:
             RobustInfeasibleError: No grip holds even the nominal object somewhere on the path.
             DivergedError: The start's state is more than numbers can hold.
         """
-        replanner = None
-        if execution is not None:
-            scenario, joint_path = execution.scenario, execution.joint_path
-            grip = execution.grip
-            replanner = Replanner(execution) if control.inertia else None
         self._path = ScrewPath(scenario.path)
         self.robot = robot = RobotModel(scenario)
         joint_path = joint_path or plan_joints(scenario)

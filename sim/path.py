@@ -47,6 +47,12 @@ class ScrewPath:
         # Translation per radian on top of the turn [m].
         self.advance = pivot.pitch * self.axis + np.asarray(pivot.travel, float) / self.end
         self._R_WO = rotation(pivot.start)
+        # With q_0 the start, q times the inverse of q_0 has the real part cos(tilt / 2) and, along
+        # the axis, the part sin(tilt / 2): both are linear in q, with these rows.
+        q_0 = self._R_WO.as_quat(scalar_first=True)
+        w, v = q_0[0], q_0[1:]
+        sine = np.concatenate([[-v @ self.axis], w * self.axis + np.cross(self.axis, v)])
+        self._half_tilt = q_0, sine
         self._p_WO = np.asarray(pivot.start.position, float)
 
     def pose(self, tilt: float) -> tuple[Array, Array]:
@@ -73,13 +79,9 @@ class ScrewPath:
         The twist is the part of the rotation from the start that is about the axis, in
         [-pi, pi); what is left, the swing, does not count as tilt.
         """
-        flat = np.reshape(quaternion, (-1, 4))
-        turn = (Rotation.from_quat(flat, scalar_first=True) * self._R_WO.inv()).as_quat(
-            scalar_first=True
-        )
-        twist = 2.0 * np.arctan2(turn[:, 1:] @ self.axis, turn[:, 0])
-        twist = np.mod(twist + np.pi, 2.0 * np.pi) - np.pi
-        return twist.reshape(np.shape(quaternion)[:-1])
+        # Sums, not a product of matrices, whose rounding depends on how many rows there are.
+        cosine, sine = ((quaternion * row).sum(axis=-1) for row in self._half_tilt)
+        return np.mod(2.0 * np.arctan2(sine, cosine) + np.pi, 2.0 * np.pi) - np.pi
 
 
 def minimum_jerk(x: Array | float) -> tuple[Array, Array, Array]:

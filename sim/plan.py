@@ -201,6 +201,7 @@ def plan(
     uncertainty: UncertaintySet = CERTAIN,
     start: float = 0.0,
     start_rate: float = 0.0,
+    curve: BSpline | None = None,
 ) -> Plan:
     """Plans the tilt of a scenario.
 
@@ -213,6 +214,7 @@ def plan(
         uncertainty: What the plan is to serve with one timing and one grip.
         start: Share of the tilt at which it begins, below 1 [-].
         start_rate: At which rate of that share [1/s].
+        curve: Joint angles over the share of the tilt, where they are known already.
 
     Raises:
         InvalidInputError: An argument is senseless.
@@ -223,7 +225,7 @@ def plan(
         raise InvalidInputError("points", points, "an integer >= 3")
     if not 0.0 <= start < 1.0:
         raise InvalidInputError("start", start, "a share in [0, 1)")
-    problem, curve, joints = path_problem(scenario, margins, points, uncertainty, start)
+    problem, curve, joints = path_problem(scenario, margins, points, uncertainty, start, curve)
     problem = replace(problem, objective=objective, duration=duration, start_rate=start_rate)
     what = "every tilt" if math.isinf(duration) else f"every tilt in at most {duration:g} s"
     return Plan(scenario, margins, joints, _solve(scenario, problem, what), curve)

@@ -15,13 +15,12 @@ from sim.ik import JointPath, plan_joints
 from sim.inertia import inertial_wrenches
 from sim.path import ScrewPath
 from sim.robot import RobotModel
-from sim.scenario import GRAVITY, Scenario
+from sim.scenario import Scenario
 from sim.settings import Control
-from sim.statics import Statics
+from sim.statics import Statics, gravity
 from synthesis import InvalidInputError, Problem
 from synthesis.contact import Array
 from synthesis.path_problem import Accelerations, InertialTorques, Load, PathProblem, Rates
-from synthesis.sensitivity import Gravity
 from synthesis.uncertainty_set import UncertaintySet
 
 # Degree of the spline through the joint angles, and their pose error [m and rad]: a cubic one and
@@ -75,6 +74,7 @@ def path_problem(
     points: int,
     uncertainty: UncertaintySet = CERTAIN,
     start: float = 0.0,
+    curve: BSpline | None = None,
 ) -> tuple[PathProblem, BSpline, tuple[str, ...]]:
     """The path problem of a scenario's tilt, the joint angles over its share, and the joints.
 
@@ -86,6 +86,7 @@ def path_problem(
             set. Its share of friction comes on top of the margins' factor. The first load is the
             scenario itself, with the set's friction.
         start: Share of the tilt at which the path begins [-].
+        curve: The joint angles, where they are known already.
 
     Raises:
         PathError: The arms cannot follow the path.
@@ -100,7 +101,8 @@ def path_problem(
         sets += [(corner, rest) for corner in _corners(scenario, uncertainty)]
     worlds = [_gripped(world, margins.grip_max) for world, _ in sets]
     statics = [Statics(world, control, robot) for world in worlds]
-    curve = tilting_curve(plan_joints(scenario, _SOLVED))
+    if curve is None:
+        curve = tilting_curve(plan_joints(scenario, _SOLVED))
     s = np.linspace(start, 1.0, points)
     q, slope, curvature = curve(s), curve(s, 1), curve(s, 2)
     problems: list[list[tuple[Problem, ...]]] = [[] for _ in worlds]
@@ -113,7 +115,7 @@ def path_problem(
         for i, world in enumerate(worlds):
             at_rest = statics[i].problem(p_WO, quaternion, path.end * s[k])
             limited = _within(at_rest, margins.limits)
-            problems[i].append(sets[i][1].worlds(limited, _gravity(world, R_WO)))
+            problems[i].append(sets[i][1].worlds(limited, gravity(world.object, R_WO)))
     wrenches = [[inertial_wrenches(world, path, path.end * x) for x in s] for world in worlds]
     rates, accelerations = _tips(scenario, margins, path, s)
     problem = PathProblem(
@@ -144,17 +146,9 @@ def _corners(scenario: Scenario, uncertainty: UncertaintySet) -> list[Scenario]:
     ]
     corners = []
     for share, x, y, z in itertools.product(sorted(shares), *map(sorted, places)):
-        a, b, c = (share * moment for moment in thing.inertia)
-        other = replace(thing, mass=share * thing.mass, inertia=(a, b, c), center_of_mass=(x, y, z))
+        other = replace(thing.weighing(share), center_of_mass=(x, y, z))
         corners.append(replace(scenario, object=other))
     return corners
-
-
-def _gravity(scenario: Scenario, R_WO: Array) -> Gravity:
-    """The weight of a scenario's object, in its axes."""
-    thing = scenario.object
-    down_O = R_WO.T @ np.array([0.0, 0.0, -1.0])
-    return Gravity(thing.mass * GRAVITY, down_O, np.asarray(thing.center_of_mass))
 
 
 def _gripped(scenario: Scenario, grip_max: float) -> Scenario:

@@ -9,9 +9,9 @@ from sim.grip import GripSchedule
 from sim.ik import JointPath, plan_joints
 from sim.path import ScrewPath
 from sim.robot import RobotModel
-from sim.scenario import GRAVITY, Scenario
+from sim.scenario import Scenario
 from sim.settings import Control
-from sim.statics import Statics
+from sim.statics import Statics, gravity
 from synthesis import InvalidInputError, Problem
 from synthesis.contact import Array
 from synthesis.sensitivity import Gravity
@@ -72,12 +72,7 @@ class PathProblems:
 
     def gravity(self, tilt_deg: float) -> Gravity:
         """The object's weight at a tilt [deg]."""
-        thing = self.scenario.object
-        return Gravity(
-            weight=thing.mass * GRAVITY,
-            direction_O=self.orientation(tilt_deg).T @ np.array([0.0, 0.0, -1.0]),
-            center_O=np.asarray(thing.center_of_mass),
-        )
+        return gravity(self.scenario.object, self.orientation(tilt_deg))
 
     def orientation(self, tilt_deg: float) -> Array:
         """Orientation of the object at a tilt [deg], R_WO, (3, 3)."""

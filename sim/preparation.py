@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from sim.execution import Execution, Planning, planned_tilt
 from sim.explain import Explanation, explain
 from sim.grip import GripSchedule
 from sim.ik import JointPath, plan_joints
@@ -41,10 +42,17 @@ class Preparation:
     Attributes:
         joint_path: How the arms follow the object's path.
         grip: The least grip over the tilt; None for the control's preload alone.
+        execution: The planned tilt, with the scenario that it makes; None if it is not planned.
     """
 
     joint_path: JointPath
     grip: GripSchedule | None
+    execution: Execution | None = None
+
+    @staticmethod
+    def of(execution: Execution) -> Preparation:
+        """That of a planned tilt."""
+        return Preparation(execution.joint_path, execution.grip, execution)
 
 
 def prepare(
@@ -52,6 +60,7 @@ def prepare(
     control: Control,
     check: bool = True,
     joint_path: JointPath | None = None,
+    planning: Planning | None = None,
 ) -> Preparation:
     """Plans a run.
 
@@ -60,11 +69,15 @@ def prepare(
         control: The controller.
         check: Whether to refuse what a certificate proves infeasible at one of the path's tilts.
         joint_path: The scenario's, where it is planned already.
+        planning: How the tilt is planned; None for the scenario's own timing.
 
     Raises:
         PathError: The arms cannot follow the path.
+        PlanError: The planned tilt breaks a limit.
         UnholdableError: Somewhere on it no forces hold the object.
     """
+    if planning is not None:
+        return Preparation.of(planned_tilt(scenario, planning))
     joint_path = joint_path or plan_joints(scenario)
     if not control.feedforward:
         return Preparation(joint_path, None)

@@ -55,11 +55,8 @@ class References:
         self._qd, self._qdd = np.empty_like(self._q), np.empty_like(self._q)
         for phase in range(len(path.schedule.phases)):
             rows = asked.phase == phase
-            q, slope = path.at(phase, asked.progress[rows])
-            rate, acceleration = asked.rate[rows, None], asked.acceleration[rows, None]
-            self._q[rows], self._qd[rows] = q, slope * rate
-            curvature = path.curvature(phase, asked.progress[rows])
-            self._qdd[rows] = slope * acceleration + curvature * rate**2
+            progress = asked.progress[rows], asked.rate[rows, None], asked.acceleration[rows, None]
+            self._q[rows], self._qd[rows], self._qdd[rows] = _motion(path, phase, *progress)
         self._rate, self._acceleration = asked.turn * asked.rate, asked.turn * asked.acceleration
 
     def at(self, t: float) -> Target:
@@ -73,10 +70,19 @@ class References:
         else:
             asked = self._path.schedule.at(t)
             phase, tilt, grip = asked.phase, asked.tilt, asked.grip
-            q, slope = self._path.at(int(phase), asked.progress)
-            qd, curvature = slope * asked.rate, self._path.curvature(int(phase), asked.progress)
-            qdd = slope * asked.acceleration + curvature * asked.rate**2
+            q, qd, qdd = _motion(
+                self._path, int(phase), asked.progress, asked.rate, asked.acceleration
+            )
             rate, acceleration = asked.turn * asked.rate, asked.turn * asked.acceleration
         return Target(
             int(phase), float(tilt), float(grip), q, qd, float(rate), float(acceleration), qdd
         )
+
+
+def _motion(
+    path: JointPath, phase: int, progress: Array, rate: Array, acceleration: Array
+) -> tuple[Array, Array, Array]:
+    """Angles, speeds and accelerations of the joints at a phase's progress and its derivatives."""
+    q, slope = path.at(phase, progress)
+    curvature = path.curvature(phase, progress)
+    return q, slope * rate, slope * acceleration + curvature * rate**2

@@ -55,7 +55,7 @@ class Replanner:
 
     def __init__(self, execution: Execution) -> None:
         self._nominal, self._scenario = execution.plan.scenario, execution.scenario
-        self._pace = execution.planning.stretch
+        self._pace, self._curve = execution.planning.stretch, execution.plan.q
         self._margins, self._end = execution.plan.margins, execution.joint_path.schedule.end
         self.phase, self.joint_path = execution.phase, execution.joint_path
 
@@ -85,7 +85,12 @@ class Replanner:
         start_rate = rate * self._pace
         try:
             rest = plan(
-                self._nominal, self._margins, points=points, start=share, start_rate=start_rate
+                self._nominal,
+                self._margins,
+                points=points,
+                start=share,
+                start_rate=start_rate,
+                curve=self._curve,
             )
         except (PlanError, SolverError):
             return None

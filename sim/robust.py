@@ -60,15 +60,23 @@ def plan_grip(
     )
 
 
-def borne(scenario: Scenario, control: Control, step_deg: float) -> dict[float, Scaling]:
+def borne(
+    scenario: Scenario, control: Control, step_deg: float, joint_path: JointPath | None = None
+) -> dict[float, Scaling]:
     """How much of the set of a robust control one grip bears, by tilt [deg].
+
+    Args:
+        scenario: The scene as it is believed.
+        control: The controller.
+        step_deg: Largest step between tilts [deg].
+        joint_path: The scenario's, where it is planned already.
 
     Raises:
         PathError: The arms cannot follow the path.
         RobustInfeasibleError: At a tilt no forces hold even the nominal object.
     """
     assert control.robustness is not None
-    problems = _true_problems(scenario, control, None)
+    problems = _true_problems(scenario, control, joint_path)
     return {
         tilt: largest_scaling(
             problems.problem(tilt), problems.gravity(tilt), control.robustness.uncertainty

@@ -12,13 +12,14 @@ from pathlib import Path
 from types import FrameType
 from typing import Any
 
-from sim.execution import Execution, Planning, planned_tilt
+from sim.execution import Planning
 from sim.files import check_new_folder, finite, write_json
 from sim.judge import Judge
 from sim.loop import ClosedLoop, DivergedError
 from sim.monitor import ContactHistory, Monitor
 from sim.preparation import Preparation, prepare
 from sim.recording import Recorder, open_viewer
+from sim.replanning import Replanner
 from sim.report import Report, RunInfo
 from sim.scenario import Scenario
 from sim.settings import Control
@@ -73,7 +74,6 @@ def execute(
     request: Request,
     progress: Progress | None = None,
     prepared: Preparation | None = None,
-    execution: Execution | None = None,
 ) -> Result:
     """Runs to the end, or until interrupted (SIGINT, SIGTERM), and leaves a complete record.
 
@@ -81,7 +81,6 @@ def execute(
         request: What to run.
         progress: Called with steps done and steps in total after every block.
         prepared: What :func:`prepare` gives for the request, where that has been done already.
-        execution: The planned tilt, where the request's planning has been done already.
 
     Raises:
         PathError: The arms cannot follow the path; nothing has moved.
@@ -94,12 +93,13 @@ def execute(
     out = request.out
     if out is not None:
         check_new_folder("out", out)
-    if request.planning is not None:
-        execution = execution or planned_tilt(request.scenario, request.planning)
+    if prepared is None:
+        check, planning = not request.anyway, request.planning
+        prepared = prepare(request.scenario, request.control, check, planning=planning)
+    execution, replanner = prepared.execution, None
+    if execution is not None:
         request = dataclasses.replace(request, scenario=execution.scenario)
-        prepared = Preparation(execution.joint_path, execution.grip)
-    elif prepared is None:
-        prepared = prepare(request.scenario, request.control, check=not request.anyway)
+        replanner = Replanner(execution) if request.control.inertia else None
     loop = ClosedLoop(
         request.scenario,
         request.control,
@@ -107,7 +107,7 @@ def execute(
         joint_path=prepared.joint_path,
         world=request.world,
         grip=prepared.grip,
-        execution=execution,
+        replanner=replanner,
     )
     monitor = Monitor(loop.truth)
     robot = loop.robot

@@ -93,6 +93,12 @@ class Object:
             positive(f"{self.name}.inertia", moment)
         vector(f"{self.name}.center_of_mass", self.center_of_mass, 3)
 
+    def weighing(self, factor: float) -> Object:
+        """The object with so many times the mass, and inertia in proportion."""
+        x, y, z = self.inertia
+        inertia = (factor * x, factor * y, factor * z)
+        return replace(self, mass=factor * self.mass, inertia=inertia)
+
 
 @dataclass(frozen=True)
 class Friction:

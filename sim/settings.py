@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, fields, replace
 
-from sim.checks import length, not_negative, positive, whole
+from sim.checks import each, length, not_negative, positive, whole
 from sim.timing import Timing
 from synthesis import InvalidInputError, Objective
 from synthesis.uncertainty_set import UncertaintySet
@@ -74,12 +74,18 @@ LEAVE = (
 )
 
 
+def tilting(phases: tuple[Phase, ...]) -> tuple[int, ...]:
+    """Indices of the phases that tilt the object."""
+    before = (0.0, *(phase.tilt for phase in phases))
+    return tuple(i for i, phase in enumerate(phases) if phase.tilt != before[i])
+
+
 def stretched(phases: tuple[Phase, ...], duration_s: float) -> tuple[Phase, ...]:
     """The phases with every one that tilts the object taking the given time [s]."""
-    before = (0.0, *(phase.tilt for phase in phases))
+    turns = tilting(phases)
     return tuple(
-        replace(phase, duration_s=duration_s, timing=None) if phase.tilt != tilt else phase
-        for phase, tilt in zip(phases, before, strict=False)
+        replace(phase, duration_s=duration_s, timing=None) if i in turns else phase
+        for i, phase in enumerate(phases)
     )
 
 
@@ -102,6 +108,11 @@ class Robustness:
     def __post_init__(self) -> None:
         not_negative("robustness.preload", self.preload)
         not_negative("robustness.reaction", self.reaction)
+
+
+def _threshold(field: str, value: float) -> None:
+    if not value > 0.0:
+        raise InvalidInputError(field, value, "a number > 0")
 
 
 @dataclass(frozen=True)
@@ -137,10 +148,7 @@ class Guard:
     lower_s: float = 2.0
 
     def __post_init__(self) -> None:
-        for field in fields(self):
-            value = getattr(self, field.name)
-            if not value > 0.0:
-                raise InvalidInputError(f"guard.{field.name}", value, "a number > 0")
+        each("guard", self, _threshold)
 
 
 @dataclass(frozen=True)

@@ -8,10 +8,11 @@ import numpy as np
 from sim.contacts import ContactFrames, contacts
 from sim.grip import GripSchedule, pressed
 from sim.robot import RobotModel
-from sim.scenario import GRAVITY, Scenario
+from sim.scenario import GRAVITY, Object, Scenario
 from sim.settings import Control
 from synthesis import Problem
 from synthesis.contact import Array, skew
+from synthesis.sensitivity import Gravity
 
 # Contacts are made once for each of these steps, over which the least grip changes by 0.2 N [deg].
 _GRIP_STEP_DEG = 0.5
@@ -72,3 +73,12 @@ class Statics:
             joints=None if self._robot is None else self._robot.statics(p_WC[:n], R_WO @ R_OC[:n]),
             objective=self._objective,
         )
+
+
+def gravity(thing: Object, R_WO: Array) -> Gravity:
+    """The weight of an object at an orientation, (3, 3), in the object's axes."""
+    return Gravity(
+        weight=thing.mass * GRAVITY,
+        direction_O=R_WO.T @ np.array([0.0, 0.0, -1.0]),
+        center_O=np.asarray(thing.center_of_mass),
+    )

@@ -110,3 +110,8 @@ class Trace:
     def pick(self, rows: NDArray[np.intp]) -> Trace:
         """Copies of the rows with the given indices."""
         return Trace(**{f.name: getattr(self, f.name)[rows] for f in fields(self)})
+
+
+def torque_shares(tau: Array, tau_min: Array, tau_max: Array) -> Array:
+    """Sizes of torques, (..., l), over the limits on their side [-]."""
+    return np.maximum(tau / tau_max, tau / tau_min)

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, replace
 
 import mujoco
 import numpy as np
 
-from sim.checks import not_negative, whole
+from sim.checks import each, not_negative, whole
 from sim.scenario import Scenario
 from sim.scene import compose
 from sim.schedule import Schedule
@@ -67,8 +67,7 @@ class Uncertainty:
     push_s: float = 0.2
 
     def __post_init__(self) -> None:
-        for field in fields(self):
-            not_negative(f"uncertainty.{field.name}", getattr(self, field.name))
+        each("uncertainty", self, not_negative)
         for name in ("mass", "size", "friction_down", "link_mass", "torque_gain", "dropped"):
             if not getattr(self, name) < 1.0:
                 raise InvalidInputError(f"uncertainty.{name}", getattr(self, name), "in [0, 1)")
@@ -102,18 +101,15 @@ FIELD = Uncertainty(
     pushes=2,
     push=5.0,
 )
-HARSH = Uncertainty(
+HARSH = replace(
+    FIELD,
     mass=0.30,
     center_of_mass=0.030,
     friction_down=0.30,
     friction_up=0.30,
     hand_place=0.010,
-    position_noise=0.001,
-    orientation_noise=math.radians(0.5),
     latency=0.005,
-    dropped=0.01,
     torque_gain=0.10,
-    pushes=2,
     push=10.0,
 )
 PRESETS = {"nominal": NOMINAL, "lab": LAB, "field": FIELD, "harsh": HARSH}

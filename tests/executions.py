@@ -7,6 +7,7 @@ import numpy as np
 
 from scenarios import scenario
 from sim.execution import Planning, planned_tilt
+from sim.preparation import Preparation
 from sim.run import Request, execute
 from sim.settings import controllers
 from sim.world import NO_DEVIATION
@@ -24,7 +25,7 @@ def executed(name, stretch, world=NO_DEVIATION, **changes):
     s = scenario(name)
     control = replace(controllers(s.control)["dynamic"], **changes)
     request = Request(s, "dynamic", control, world=world, planning=Planning(stretch))
-    return execute(request, execution=execution(name, stretch))
+    return execute(request, prepared=Preparation.of(execution(name, stretch)))
 
 
 def longest(flags):

@@ -13,6 +13,7 @@ from scenarios.cli import main
 from sim.execution import Planning, planned_tilt
 from sim.faults import Fault, FaultKind
 from sim.plant import Measurement
+from sim.preparation import Preparation
 from sim.references import References
 from sim.replanning import Replanner
 from sim.run import Request, execute
@@ -64,7 +65,7 @@ def test_with_the_contacts_of_slow_runs_a_support_hops_and_nothing_else_changes(
     slow = replace(planned, scenario=replace(planned.scenario, physics=chosen.physics))
     control = controllers(chosen.control)["dynamic"]
     request = Request(chosen, "dynamic", control, planning=Planning(1.2))
-    result = execute(request, execution=slow)
+    result = execute(request, prepared=Preparation.of(slow))
     assert broken(CYLINDER, result) == {"contacts"}
     lost = ~result.history.kept[settled(CYLINDER, result.trace)]
     assert not lost[:, :2].any()

@@ -20,7 +20,7 @@ from sim.recording.blueprint import TIMELINE, blueprint
 from sim.recording.columns import arrows, scalars, strips
 from sim.recording.scenery import Scenery
 from sim.scenario import Scenario
-from sim.trace import Trace
+from sim.trace import Trace, torque_shares
 from synthesis.contact import Array, N
 
 
@@ -160,7 +160,7 @@ class Recorder:
 
     def _shares(self, tau: Array) -> Array:
         """Torques over their limits, with their sign."""
-        return np.maximum(tau / self._tau_max, tau / self._tau_min) * np.sign(tau)
+        return torque_shares(tau, self._tau_min, self._tau_max) * np.sign(tau)
 
     def _send_plan(self, block: Trace) -> None:
         """What was planned for the tilts of the rows, while the path moves."""

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 
 import numpy as np
 
-from sim.checks import positive
+from sim.checks import each, positive
 from sim.run import Result
 from sim.scenario import Scenario
 from sim.schedule import Schedule
@@ -31,8 +31,7 @@ class Criteria:
     saturated_s: float = 0.05
 
     def __post_init__(self) -> None:
-        for field in fields(self):
-            positive(f"criteria.{field.name}", getattr(self, field.name))
+        each("criteria", self, positive)
 
 
 @dataclass(frozen=True)

@@ -100,10 +100,6 @@ class Sweep:
 
     def world(self, episode: Episode) -> World:
         """The truth of an episode."""
-        worlds = self.episodes * math.prod(len(values) for _, values in self.grid)
-        if worlds * len(self.controllers) > _MOST:
-            valid = f"at most {_MOST} in all, over grid and controllers"
-            raise InvalidInputError("episodes", self.episodes, valid)
         drawn = draw(preset(self.preset), self.scenario, episode.seed)
         return overridden(drawn, self.scenario, dict(episode.values))
 

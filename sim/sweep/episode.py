@@ -9,7 +9,7 @@ from collections.abc import Mapping, Sequence
 from functools import lru_cache
 from typing import Any
 
-from sim.execution import Execution, planned_tilt
+from sim.execution import planned_tilt
 from sim.files import finite
 from sim.ik import plan_joints
 from sim.preparation import Preparation, prepare
@@ -33,16 +33,13 @@ class Prepared:
     Attributes:
         sweep: The sweep.
         controls: Settings by controller.
-        preparations: What is planned, by controller; the truth does not change it. None in a sweep
-            of a planned tilt.
-        execution: The planned tilt, if it is planned.
+        preparations: What is planned, by controller; the truth does not change it.
         joints: Names of the robot's joints.
     """
 
     sweep: Sweep
     controls: dict[str, Control]
     preparations: dict[str, Preparation]
-    execution: Execution | None
     joints: tuple[str, ...]
 
 
@@ -56,17 +53,19 @@ def prepared(packed: bytes) -> Prepared:
     sweep: Sweep = pickle.loads(packed)
     known = controllers(sweep.scenario.control)
     controls = {name: known[name] for name in sweep.controllers}
-    planned = None if sweep.planning is None else planned_tilt(sweep.scenario, sweep.planning)
-    path = None if planned else plan_joints(sweep.scenario)
+    if sweep.planning is not None:
+        planned = Preparation.of(planned_tilt(sweep.scenario, sweep.planning))
+        preparations = dict.fromkeys(controls, planned)
+    else:
+        path = plan_joints(sweep.scenario)
+        preparations = {
+            name: prepare(sweep.scenario, control, check=False, joint_path=path)
+            for name, control in controls.items()
+        }
     return Prepared(
         sweep=sweep,
         controls=controls,
-        preparations={
-            name: prepare(sweep.scenario, control, check=False, joint_path=path)
-            for name, control in controls.items()
-            if planned is None
-        },
-        execution=planned,
+        preparations=preparations,
         joints=RobotModel(sweep.scenario).joints,
     )
 
@@ -117,8 +116,7 @@ def run_episode(packed: bytes, episode: Episode) -> Row:
         planning=sweep.planning,
     )
     try:
-        preparation = shared.preparations.get(episode.controller)
-        result = execute(request, prepared=preparation, execution=shared.execution)
+        result = execute(request, prepared=shared.preparations[episode.controller])
     except Exception as error:  # whatever ends an episode is its failure, not the sweep's
         text = f"{type(error).__name__}: {error}"
         row |= {"cause": "error", "category": "error", "failed_at_s": 0.0, "error": text}
