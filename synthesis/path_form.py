@@ -39,7 +39,7 @@ import numpy as np
 import scipy.sparse as sp
 
 from synthesis.conic import ConicForm
-from synthesis.contact import Array
+from synthesis.contact import Array, Mask
 from synthesis.path_problem import Load, PathObjective, PathProblem
 from synthesis.problem import Objective, Problem
 from synthesis.rows import Indices, Rows
@@ -65,9 +65,23 @@ class PathForm:
         unit: Of forces and torques [N or N·m].
     """
 
-    def __init__(self, problem: PathProblem, reference: Array | None = None) -> None:
-        """Assembles the matrices, about a reference b [1/s^2], (K,), if there is one."""
-        self.problem, self._reference = problem, reference
+    def __init__(
+        self,
+        problem: PathProblem,
+        reference: Array | None = None,
+        grip: Array | None = None,
+        where: Mask | None = None,
+    ) -> None:
+        """Assembles the matrices.
+
+        Args:
+            problem: The problem.
+            reference: b [1/s^2], (K,), about which viscous friction counts, if there is one.
+            grip: Normal forces of the n hands [N], (S, n), where they are given.
+            where: Which stations count, (S,), where the timing is given; all if left out. S is
+                their number from here on.
+        """
+        self.problem, self._reference, self._grip = problem, reference, grip
         self.rows = Rows()
         self.unit = max(p.load for load in problem.loads for p in load.problems) or 1.0
         self._time = problem.timescale()
@@ -75,7 +89,8 @@ class PathForm:
         self._effort = problem.objective is PathObjective.LEAST_EFFORT
         self._points, self._ds = len(problem.s), np.diff(problem.s)
         self._timed = self._points > 1 and problem.timing is None
-        self._point, self._interval = problem.stations.T
+        stations = problem.stations
+        self._point, self._interval = (stations if where is None else stations[where]).T
         joints = problem.loads[0].problems[0].joints
         self._joints = () if joints is None else joints.names
         self._blocks = self._lay_out_columns()
@@ -278,6 +293,10 @@ class PathForm:
             b * self._time**2,
             np.sqrt(b) * self._time,
         )
+        if self._grip is not None:
+            _, form, _, _, columns = self._blocks[0]
+            hands = columns[:, form.hand_normals]
+            fixed[hands], self._constant[hands] = True, self._grip / self.unit
         self._free = np.flatnonzero(~fixed)
         self._h = h - whole @ self._constant
         self._A = whole[:, self._free]
@@ -286,7 +305,8 @@ class PathForm:
         q[self._t] = float(least_time)
         if self._margin:
             q[self._aux] = 1.0
-        P[self._u] = 2.0 * self._weights()[:, None]
+        if self._effort:
+            P[self._u] = 2.0 * self._weights()[:, None]
         self.q = q[self._free]
         self.P = sp.diags_array(P[self._free]).tocsc()
 
