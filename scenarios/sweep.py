@@ -50,10 +50,17 @@ class Sweep:
     a plan those that count with inertia, else those that do not."""
 
     plan: str | None = None
-    """least-time: plan the tilt, and execute that in every world."""
+    """least-time, least-effort or friction-margin: plan the tilt, and execute that in every
+    world."""
 
     stretch: float = 1.0
     """By how much the planned duration is stretched."""
+
+    robust: bool = False
+    """The plan also serves the uncertainty set of controller robust, or as much as it can."""
+
+    duration: float | None = None
+    """The longest that a plan may take [s]; the scenario's own if left out."""
 
     grid: str = ""
     """What to set of every world drawn, like friction=0.7:1.3:7,weight=0.8,1.0,1.2 (factors)."""
@@ -147,7 +154,9 @@ class Sweep:
         from sim.sweep.design import Sweep as Design
         from sim.sweep.parameters import parse_grid
 
-        chosen, planning = scenario(self.scenario), chosen_planning(self.plan, self.stretch)
+        chosen = scenario(self.scenario)
+        asked = self.plan, self.stretch, self.duration, self.robust
+        planning = chosen_planning(chosen, *asked)
         if planning is not None:
             chosen = planned_tilt(chosen, planning).scenario
         if self.controllers is None:
@@ -184,8 +193,8 @@ class Sweep:
         words = ["fulcrum", "sweep", self.scenario]
         for field in dataclasses.fields(self):
             value = folder if field.name == "out" else getattr(self, field.name)
-            if field.name != "scenario" and value not in (None, ""):
-                words += [f"--{field.name}", str(value)]
+            if field.name != "scenario" and value not in (None, "", False):
+                words += [f"--{field.name}"] if value is True else [f"--{field.name}", str(value)]
         return shlex.join(words)
 
 

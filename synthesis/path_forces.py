@@ -49,8 +49,7 @@ class GivenMotion:
             grip: Normal forces of the n hands at the stations [N], (S, n).
             used: Share of the friction that may be used [-].
         """
-        self._problem = replace(problem, timing=None, duration=math.inf)
-        self._b, self._grip, self._used = b, grip, used
+        self._problem, self._b, self._grip, self._used = problem, b, grip, used
         self._point, interval = problem.stations.T
         a = np.diff(b) / (2.0 * np.diff(problem.s))
         self._motion = np.stack([a[interval], b[self._point]])
@@ -87,7 +86,11 @@ class GivenMotion:
         )
         free = replace(load, problems=tuple(replace(p, contacts=contacts) for p in load.problems))
         alone = replace(
-            self._problem, loads=(free,), objective=PathObjective.FRICTION_MARGIN, timing=self._b
+            self._problem,
+            loads=(free,),
+            objective=PathObjective.FRICTION_MARGIN,
+            duration=math.inf,
+            timing=self._b,
         )
         form = PathForm(alone, grip=self._grip[where], where=where)
         slack = [np.full((stations, len(contacts)), form.unit)]

@@ -4,11 +4,8 @@ Variables, in this order: b at the grid points, c at the grid points, the time t
 the forces of every station and load as in :mod:`synthesis.conic`, the torque utilisations (least
 effort only) and :math:`\lambda` (friction margin only). The normal forces of the hands have the
 same columns for all loads, b and c at the ends are constants, and a is eliminated by
-:math:`a_k = (b_{k+1} - b_k) / (2 \Delta s_k)`. The time of an interval is
-:math:`2 \Delta s / (\sqrt{b_k} + \sqrt{b_{k+1}})`, which two second-order cones bound (Verscheure
-et al. 2009, (46) to (51)):
-
-.. math:: c_k^2 \le b_k, \qquad 2 \Delta s_k \le t_k (c_k + c_{k+1})
+:math:`a_k = (b_{k+1} - b_k) / (2 \Delta s_k)`. What ties t, c and b to one another stands in
+:mod:`synthesis.path_cones`.
 
 Viscous friction counts with c, which is exact where time presses c to :math:`\sqrt b`. Where it
 does not, the problem is solved again about the last solution :math:`\bar b`, with the tangent
@@ -40,6 +37,7 @@ import scipy.sparse as sp
 
 from synthesis.conic import ConicForm
 from synthesis.contact import Array, Mask
+from synthesis.path_cones import timing_cones
 from synthesis.path_problem import Load, PathObjective, PathProblem
 from synthesis.problem import Objective, Problem
 from synthesis.rows import Indices, Rows
@@ -238,30 +236,8 @@ class PathForm:
                 heads.append(rows[:, 0])
             self._heads.append(np.stack(heads, axis=1) if heads else np.zeros((0, 0), np.intp))
         if self._timed:
-            self._timing_cones()
+            timing_cones(self.rows, self.problem.s, self._b, self._c, self._t)
             self._acceleration_cones()
-
-    def _timing_cones(self) -> None:
-        """(1 + b) / 2 >= ||(c, (1 - b) / 2)||; (t + r) / 2 >= ||(w, (t - r) / 2)||, r = c + c'."""
-        # Rates in units of the path's length per timescale, and the time of each interval in units
-        # of its share of it: all are about 1.
-        length, share = self._ds.sum(), self._ds / self._ds.sum()
-        # Rates at the ends are constants: their cones would have no interior, and say nothing.
-        s, b, c = self.problem.s[1:-1], self._b[1:-1], self._c[1:-1]
-        if len(s):
-            rows = self.rows.new(np.tile([0.5, 0.0, 0.5], (len(s), 1)), s, [""] * 3)
-            self.rows.add(-0.5 / length**2, rows[:, 0], b)
-            self.rows.add(-1.0 / length, rows[:, 1], c)
-            self.rows.add(0.5 / length**2, rows[:, 2], b)
-            self.rows.second_order(rows)
-        h = np.tile([0.0, math.sqrt(2.0), 0.0], (len(share), 1))
-        rows = self.rows.new(h, self.problem.s[:-1], [""] * 3)
-        for column in (self._c[:-1], self._c[1:]):
-            self.rows.add(-0.5 / length, rows[:, 0], column)
-            self.rows.add(0.5 / length, rows[:, 2], column)
-        self.rows.add(-0.5 / share, rows[:, 0], self._t)
-        self.rows.add(-0.5 / share, rows[:, 2], self._t)
-        self.rows.second_order(rows)
 
     def _acceleration_cones(self) -> None:
         limited, point = self.problem.accelerations, self._point

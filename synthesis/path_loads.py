@@ -11,6 +11,7 @@ The loads to begin with are those that bind on a coarse grid, where all are solv
 
 from __future__ import annotations
 
+import contextlib
 from dataclasses import replace
 
 import numpy as np
@@ -43,10 +44,9 @@ def solve_many(problem: PathProblem) -> PathSolution:
     chosen, points = [0], len(problem.s)
     if points > 2 * _COARSE:
         coarse = np.linspace(0, points - 1, _COARSE).round().astype(int)
-        try:
+        # Where a coarse grid leaves no room the fine one decides.
+        with contextlib.suppress(InfeasiblePathError):
             chosen = _binding(solve_path(problem.at(coarse)))
-        except InfeasiblePathError:
-            pass  # a coarse grid leaves less room; the fine one decides
     search = _Search(problem, chosen)
     search.run()
     return search.solution()

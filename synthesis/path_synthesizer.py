@@ -80,6 +80,7 @@ class Found:
     solve_s: float
 
     def solution(self, form: PathForm, value: float) -> PathSolution:
+        """The same by its names, with a value of the objective."""
         return PathSolution(
             problem=form.problem,
             value=value,
