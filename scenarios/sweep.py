@@ -193,7 +193,7 @@ class Sweep:
         words = ["fulcrum", "sweep", self.scenario]
         for field in dataclasses.fields(self):
             value = folder if field.name == "out" else getattr(self, field.name)
-            if field.name != "scenario" and value not in (None, "", False):
+            if field.name != "scenario" and value not in (None, "") and value is not False:
                 words += [f"--{field.name}"] if value is True else [f"--{field.name}", str(value)]
         return shlex.join(words)
 

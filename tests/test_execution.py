@@ -246,8 +246,8 @@ def test_where_there_is_no_plan_one_sentence_says_why(tmp_path, capsys, command)
 
 def test_an_episode_of_a_sweep_executes_the_plan_and_its_replay_says_so():
     planning = Planning(1.5)
-    chosen = planned_tilt(scenario(CYLINDER), planning).scenario
-    sweep = Sweep(chosen, ("dynamic",), "nominal", episodes=1, seed=3, planning=planning)
+    planned = execution(CYLINDER, 1.5)
+    sweep = Sweep(planned.scenario, ("dynamic",), "nominal", episodes=1, seed=3, planning=planning)
     (episode,) = sweep.all_episodes()
     assert sweep.replay(episode) == (
         "fulcrum run cylinder-tilt --controller dynamic --preset nominal --seed 3 "
@@ -263,4 +263,5 @@ def test_an_episode_of_a_sweep_executes_the_plan_and_its_replay_says_so():
         world=sweep.world(episode),
         planning=planning,
     )
-    assert row["tilt.max_error_deg"] == execute(replay).report.tilt.max_error_deg
+    again = execute(replay, prepared=Preparation.of(planned))
+    assert row["tilt.max_error_deg"] == again.report.tilt.max_error_deg

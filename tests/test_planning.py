@@ -51,8 +51,8 @@ def test_a_robust_plan_says_how_much_of_the_set_it_serves(tmp_path, capsys):
     assert content["loads"] == 1 + 16 * 4
     assert np.shape(content["stations"]["torque"]) == (65, 38, 14)
     assert "65 worlds: 100 % of the set" in capsys.readouterr().out
-    _, certain = planned(tmp_path / "other", "box-tilt")
-    assert content["duration_s"] > 1.02 * certain["duration_s"]
+    # The certain plan takes 1.07 s on this grid.
+    assert 1.1 < content["duration_s"] < 1.15
 
 
 def test_a_plan_can_be_stretched(tmp_path):
