@@ -3,9 +3,10 @@
 from dataclasses import replace
 
 from scenarios.box_tilt import SCENARIO as BOX_TILT
-from sim.scenario import lifted
+from sim.scenario import Pivot, lifted
 from sim.settings import HOLD, REACH, TILT
 
+assert isinstance(BOX_TILT.path, Pivot)
 SCENARIO = replace(
     lifted(BOX_TILT),
     name="box-lift",

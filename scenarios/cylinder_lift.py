@@ -3,8 +3,9 @@
 from dataclasses import replace
 
 from scenarios.cylinder_tilt import SCENARIO as CYLINDER_TILT
-from sim.scenario import lifted
+from sim.scenario import Pivot, lifted
 
+assert isinstance(CYLINDER_TILT.path, Pivot)
 SCENARIO = replace(
     lifted(CYLINDER_TILT),
     name="cylinder-lift",

@@ -11,7 +11,7 @@ from scenarios import scenario
 from scenarios.box_tilt import HEIGHT
 from scenarios.cylinder_tilt import LENGTH as CYLINDER_LENGTH
 from sim.poses import PathProblems
-from sim.scenario import Scenario
+from sim.scenario import Pivot, Scenario
 from synthesis import InfeasibleError, Objective, Solution, Synthesizer
 from synthesis.contact import Array, N
 
@@ -63,6 +63,7 @@ def paper_cylinder() -> Scenario:
     at_rim = tuple(
         replace(hand, p_OC_O=(CYLINDER_LENGTH / 2, *hand.p_OC_O[1:])) for hand in tilted.hands
     )
+    assert isinstance(tilted.path, Pivot)
     return replace(tilted, hands=at_rim, path=replace(tilted.path, angle_deg=90.0))
 
 
