@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import tyro
 
+from scenarios.check import Check
 from scenarios.commands import Capacity, Explain
 from scenarios.common import (
     BAD_INPUT,
@@ -25,6 +26,7 @@ from scenarios.common import (
     progress_bar,
     results_folder,
 )
+from scenarios.new import New
 from scenarios.paper.command import Reproduce
 from scenarios.planning import Plan
 from scenarios.sweep import Sweep
@@ -210,6 +212,8 @@ Command = (
     | Annotated[Screenshot, tyro.conf.subcommand("screenshot")]
     | Annotated[View, tyro.conf.subcommand("view")]
     | Annotated[Explain, tyro.conf.subcommand("explain")]
+    | Annotated[Check, tyro.conf.subcommand("check")]
+    | Annotated[New, tyro.conf.subcommand("new")]
     | Annotated[Capacity, tyro.conf.subcommand("capacity")]
     | Annotated[Plan, tyro.conf.subcommand("plan")]
     | Annotated[Reproduce, tyro.conf.subcommand("reproduce")]
@@ -241,7 +245,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 def _parse(
     arguments: Sequence[str] | None,
-) -> List | Run | Screenshot | View | Explain | Capacity | Plan | Reproduce | Sweep:
+) -> List | Run | Screenshot | View | Explain | Check | New | Capacity | Plan | Reproduce | Sweep:
     """The command asked for; a parse error leaves as one line instead of tyro's box."""
     errors = io.StringIO()
     try:

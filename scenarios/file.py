@@ -22,6 +22,7 @@ from sim.settings import HOLD, tilting
 
 SUFFIX = ".toml"
 SCENES = Path(__file__).parent / "scenes"
+TEMPLATE = Path(__file__).parent / "template.toml"
 SCHEMA = SCENES / "scenario.schema.json"
 # Longer ones are no scenario [bytes].
 _LONGEST = 2_000_000
@@ -37,7 +38,15 @@ def read(file: Path, allowed: tuple[Path, ...] = ()) -> Scenario:
     Raises:
         FileError: It is not valid; says where and why.
     """
-    source = open_source(file)
+    return made(open_source(file), allowed)
+
+
+def made(source: Source, allowed: tuple[Path, ...] = ()) -> Scenario:
+    """The scenario of a text, as :func:`read` of the file that it is for.
+
+    Raises:
+        FileError: It is not valid; says where and why.
+    """
     if "lifted_from" in source.data:
         return _lifted(source, _validated(source, LiftedFile), allowed)
     return build(source, _validated(source, ScenarioFile), Places(source, allowed))

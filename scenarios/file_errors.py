@@ -8,12 +8,12 @@ import itertools
 import tomllib
 from collections.abc import Iterator
 from pathlib import Path
-from types import UnionType
-from typing import Annotated, Any, Literal, Union, get_args, get_origin
+from typing import Any
 
 from pydantic import BaseModel, ValidationError
 
 from scenarios.file_keys import CORNER, NAME, PREFIX
+from scenarios.file_walk import table_at
 from synthesis import InvalidInputError
 
 Key = tuple[str | int, ...]
@@ -251,11 +251,11 @@ def _shown(given: object) -> str:
 
 def keys_at(model: type[BaseModel], loc: tuple[str | int, ...]) -> list[str]:
     """The keys that the table may have in which a location ends."""
-    return list(_table(model, loc).model_fields)
+    return list(table_at(model, loc).model_fields)
 
 
 def _described(model: type[BaseModel], loc: tuple[str | int, ...]) -> str:
-    field = _table(model, loc).model_fields[str(loc[-1])]
+    field = table_at(model, loc).model_fields[str(loc[-1])]
     text = (field.description or "a value").rstrip(".").replace("\n", " ")
     return f"a value for this key ({_lower(text)})"
 
@@ -263,51 +263,3 @@ def _described(model: type[BaseModel], loc: tuple[str | int, ...]) -> str:
 def _lower(text: str) -> str:
     """A sentence as part of another."""
     return text[:1].lower() + text[1:]
-
-
-def _table(model: type[BaseModel], loc: tuple[str | int, ...]) -> type[BaseModel]:
-    """The model of the table in which a location ends."""
-    reached: list[Any] = [model]
-    for part in loc[:-1]:
-        inner = [step for annotation in reached for step in _steps(annotation, part)]
-        reached = inner or reached  # a tag names no more than which of the union's members it is
-    tables = [t for t in _members(reached) if isinstance(t, type) and issubclass(t, BaseModel)]
-    tagged = [t for t in tables if set(_tags(t)) & set(loc)]
-    return (tagged or tables)[0]
-
-
-def _members(annotations: list[Any]) -> list[Any]:
-    """What annotations are made of, with unions and decorations taken apart."""
-    found = []
-    for annotation in annotations:
-        origin, arguments = get_origin(annotation), get_args(annotation)
-        if origin is Annotated:
-            found += _members([arguments[0]])
-        elif origin in (Union, UnionType):
-            found += _members(list(arguments))
-        else:
-            found.append(annotation)
-    return found
-
-
-def _steps(annotation: Any, part: str | int) -> list[Any]:
-    """What a key or an index of a value of that kind leads to."""
-    found = []
-    for member in _members([annotation]):
-        if isinstance(member, type) and issubclass(member, BaseModel):
-            if part in member.model_fields:
-                found.append(member.model_fields[str(part)].annotation)
-        elif get_origin(member) is dict and isinstance(part, str):
-            found.append(get_args(member)[1])
-        elif get_origin(member) is list and isinstance(part, int):
-            found.append(get_args(member)[0])
-    return found
-
-
-def _tags(table: type[BaseModel]) -> tuple[str, ...]:
-    """What the table's shape or kind may be, if that says which table it is."""
-    for name in ("shape", "kind"):
-        field = table.model_fields.get(name)
-        if field is not None and get_origin(field.annotation) is Literal:
-            return get_args(field.annotation)
-    return ()

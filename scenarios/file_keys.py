@@ -15,12 +15,20 @@ PREFIX = r"^([A-Za-z][A-Za-z0-9_]*)?$"
 Number = Annotated[float, Field(strict=True)]
 Positive = Annotated[Number, Gt(0.0)]
 NotNegative = Annotated[Number, Ge(0.0)]
-Vector3 = Annotated[list[Number], Len(3, 3)]
-Size3 = Annotated[list[Positive], Len(3, 3)]
+Vector3 = Annotated[list[Number], Len(3, 3), Field(examples=[[0.0, 0.0, 0.0]])]
+# Directions need not be of length 1.
+Direction = Annotated[list[Number], Len(3, 3), Field(examples=[[0.0, 0.0, 1.0]])]
+Quaternion4 = Annotated[list[Number], Len(4, 4), Field(examples=[[1.0, 0.0, 0.0, 0.0]])]
+# Where on a face, along each of its two coordinates.
+Place2 = Annotated[
+    list[Annotated[Number, Field(ge=0.0, le=1.0)]], Len(2, 2), Field(examples=[[0.5, 0.5]])
+]
+Size3 = Annotated[list[Positive], Len(3, 3), Field(examples=[[0.01, 0.01, 0.01]])]
 # What bodies, geoms and contacts are called in the simulation, in reports and in recordings.
 Name = Annotated[str, Field(pattern=NAME)]
-Corner = Annotated[str, Field(pattern=CORNER)]
+Corner = Annotated[str, Field(pattern=CORNER, examples=["-x +y -z"])]
 Colour = Annotated[list[Annotated[Number, Ge(0.0), Field(le=1.0)]], Len(4, 4)]
+Face = Annotated[str, Field(max_length=20, examples=["+y"])]
 Text = Annotated[str, Field(min_length=1, max_length=200)]
 
 
@@ -45,5 +53,5 @@ class Placed(Table):
     rpy_deg: Vector3 | None = None
     """Orientation as roll, pitch and yaw about the fixed axes x, y and z, in this order [deg]."""
 
-    quaternion: Annotated[list[Number], Len(4, 4)] | None = None
+    quaternion: Quaternion4 | None = None
     """Orientation as a quaternion wxyz, instead of rpy_deg."""

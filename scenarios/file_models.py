@@ -14,8 +14,10 @@ from pydantic import Field
 from scenarios.file_keys import (
     Colour,
     Corner,
+    Direction,
+    Face,
     Name,
-    Number,
+    Place2,
     Placed,
     Positive,
     Size3,
@@ -174,23 +176,23 @@ class HandTable(Table):
     """palm_pad, finger_tip, or an MJCF file with a body `pad`, a spherical geom `tip` and a site
     `tip_center`."""
 
-    face: Text | None = None
+    face: Face | None = None
     """Face of the object that it touches: of a box +x, -x, +y, -y, +z, -z."""
 
-    at: Annotated[list[Annotated[Number, Field(ge=0.0, le=1.0)]], Len(2, 2)] | None = None
+    at: Place2 | None = None
     """Where on the face, from 0 to 1 along each of its two directions; its middle, if left out."""
 
     point_m: Vector3 | None = None
     """Where it touches, in the object's frame [m], instead of face and at."""
 
-    normal: Vector3 | None = None
+    normal: Direction | None = None
     """Inward normal there, in the object's axes; that of the surface, if it is left out."""
 
-    tangent: Vector3 | None = None
+    tangent: Direction | None = None
     """First tangent there, which is the x axis of the tip; z across the normal, if it is left out,
     or x where the normal is along z."""
 
-    may_touch: list[Text] | None = None
+    may_touch: list[Face] | None = None
     """Faces to which `fulcrum place` may move it; its own, if they are left out."""
 
     friction: FrictionTable
@@ -212,10 +214,10 @@ class SupportTable(Table):
     point_m: Vector3 | None = None
     """The point in the object's frame [m], instead of a corner."""
 
-    normal: Vector3 | None = None
+    normal: Direction | None = None
     """Normal into the object, in world axes; that of the surface, if it is left out."""
 
-    tangent: Vector3 | None = None
+    tangent: Direction | None = None
     """First tangent, in world axes; z across the normal, if it is left out, or x where the normal
     is along z."""
 

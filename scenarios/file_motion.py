@@ -10,6 +10,7 @@ from pydantic import Discriminator, Field, Tag
 from scenarios.file_keys import (
     PREFIX,
     Corner,
+    Direction,
     NotNegative,
     Number,
     Placed,
@@ -73,7 +74,7 @@ class TurnTable(Table):
     point_m: Vector3 | None = None
     """A point on the axis, in the world [m], instead of an edge."""
 
-    axis: Vector3 | None = None
+    axis: Direction | None = None
     """Direction of the axis, in world axes, with point_m."""
 
 
