@@ -101,24 +101,24 @@ def _print(console: Console, scenario: Scenario, controller: str, found: Feasibi
     if held.all():
         table.add_row("forces over the path", "yes", f"0 to {tilts[-1]:g} deg")
     else:
-        none = f"{tilts[~held][0]:g} deg, and {np.count_nonzero(~held) - 1} more of {len(tilts)}"
+        none = f"{tilts[~held][0]:.3g} deg, and {np.count_nonzero(~held) - 1} more of {len(tilts)}"
         table.add_row("forces over the path", "[red]no[/]", none)
     if held.any():
-        k, hand = np.unravel_index(np.nanargmax(curves.grip), curves.grip.shape)
-        where = f"{scenario.hands[hand].name}, {tilts[k]:g} deg"
-        table.add_row("largest grip", f"{curves.grip[k, hand]:.1f} N", where)
+        step, hand = np.unravel_index(np.nanargmax(curves.grip), curves.grip.shape)
+        where = f"{scenario.hands[hand].name}, {tilts[step]:.3g} deg"
+        table.add_row("largest grip", f"{curves.grip[step, hand]:.1f} N", where)
         if np.isfinite(curves.torque).any():
             k = int(np.nanargmax(curves.torque))
-            where = f"{curves.joint[k]}, {tilts[k]:g} deg"
+            where = f"{curves.joint[k]}, {tilts[k]:.3g} deg"
             table.add_row("largest torque", f"{100.0 * curves.torque[k]:.0f} % of its limit", where)
         k = np.nanargmax(curves.used)
-        where = f"{curves.contact[k]}, {tilts[k]:g} deg"
+        where = f"{curves.contact[k]}, {tilts[k]:.3g} deg"
         table.add_row("least friction margin", f"{100.0 * (1.0 - curves.used[k]):.0f} %", where)
     if found.grip is not None:
         k = int(np.argmin(found.grip.shares))
         where = f"{math.degrees(found.grip.tilts[k]):g} deg"
         share = f"{100.0 * found.grip.shares[k]:.0f} %"
-        table.add_row("of its uncertainty one grip bears at least", share, where)
+        table.add_row("uncertainty borne by one grip", share, where)
     console.print(table)
 
 
