@@ -111,7 +111,7 @@ def _print(console: Console, scenario: Scenario, controller: str, found: Feasibi
             k = int(np.nanargmax(curves.torque))
             where = f"{curves.joint[k]}, {tilts[k]:.3g} deg"
             table.add_row("largest torque", f"{100.0 * curves.torque[k]:.0f} % of its limit", where)
-        k = np.nanargmax(curves.used)
+        k = int(np.nanargmax(curves.used))
         where = f"{curves.contact[k]}, {tilts[k]:.3g} deg"
         table.add_row("least friction margin", f"{100.0 * (1.0 - curves.used[k]):.0f} %", where)
     if found.grip is not None:

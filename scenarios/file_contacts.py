@@ -101,7 +101,7 @@ def make_support(
         geoms[table.surface], front(surface), apply(thing.start, point)
     )
     which = (*key, "corner" if table.corner is not None else "point_m")
-    what = f"{table.surface} at the start"
+    what = f"{table.surface} with the object where it starts"
     _check_near(source, which, point, undo(thing.start, closest), what)
     normal = _normal(source, key, table.normal, direction(outward))
     return Support(

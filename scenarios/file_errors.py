@@ -246,6 +246,7 @@ def _sentence(model: type[BaseModel], details: Any, key: Key) -> tuple[object, s
 
 def _shown(given: object) -> str:
     text = f'"{given}"' if isinstance(given, str) else str(given)
+    text = text.lower() if isinstance(given, bool) else text
     return text if len(text) <= 60 else f"{text[:57]}.."
 
 
