@@ -81,7 +81,6 @@ class Sweep:
         from sim.sweep.farm import Workers, run_sweep
         from sim.sweep.picture import draw_map
         from sim.sweep.store import MAP, SUMMARY, Store
-        from sim.sweep.summary import scores
 
         workers = Workers(self.workers, self.scheduler)
         try:
@@ -95,9 +94,9 @@ class Sweep:
         before, started = len(store.missing()), time.perf_counter()
         try:
             with progress_bar(self.scenario) as move:
-                rows = run_sweep(
+                outcome = run_sweep(
                     sweep,
-                    store,
+                    folder,
                     workers,
                     lambda done, total, failures: move(
                         done, total, f"{done} of {total}, {failures} failed"
@@ -113,9 +112,8 @@ class Sweep:
             )
             return INTERRUPTED
         minutes = (time.perf_counter() - started) / 60.0
-        hands = tuple(hand.name for hand in sweep.scenario.hands)
-        found = scores(rows, hands)
-        draw_map(rows, sweep, pair, store.folder / MAP)
+        found = outcome.scores
+        draw_map(outcome.rows, sweep, pair, store.folder / MAP)
         summary = {
             "scenario": self.scenario,
             "preset": self.preset,

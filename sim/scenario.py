@@ -322,6 +322,11 @@ class Scenario:
         """Names of all contacts, hands first: the order of every per-contact array."""
         return (*(hand.name for hand in self.hands), *(support.name for support in self.supports))
 
+    def _repr_markdown_(self) -> str:
+        from sim.notebook import scenario_markdown
+
+        return scenario_markdown(self)
+
 
 def lifted(scenario: Scenario) -> Scenario:
     """The scenario without its environment contacts: the object lies there, but is to come off."""
