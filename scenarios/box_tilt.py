@@ -38,7 +38,7 @@ def _hand(name: str, side: float) -> Hand:
     return Hand(
         name=name,
         mount=f"{name}_hand_link",
-        model="palm_pad.xml",
+        model="palm_pad",
         geom="box",
         p_OC_O=(ALONG - LENGTH / 2, side * WIDTH / 2, UP - HEIGHT / 2),
         normal_O=(0.0, -side, 0.0),
@@ -85,14 +85,15 @@ SCENARIO = Scenario(
     ),
     hands=(_hand("left", 1.0), _hand("right", -1.0)),
     supports=(_edge("edge_left", 1.0), _edge("edge_right", -1.0)),
-    robot=Robot(
-        model="baxter.xml",
-        description="baxter_description/urdf/baxter.urdf",
-        posture={
-            f"{side}_{joint}": -angle if side == "right" and joint in _MIRRORED else angle
-            for side in ("left", "right")
-            for joint, angle in _POSTURE.items()
-        },
+    robots=(
+        Robot(
+            model="baxter",
+            posture={
+                f"{side}_{joint}": -angle if side == "right" and joint in _MIRRORED else angle
+                for side in ("left", "right")
+                for joint, angle in _POSTURE.items()
+            },
+        ),
     ),
     path=Pivot(
         start=Pose((EDGE_X + LENGTH / 2, 0.0, HEIGHT / 2)),

@@ -50,7 +50,7 @@ def _finger(name: str, radius: float, side: float) -> Hand:
     return Hand(
         name=name,
         mount=f"{name}_finger",
-        model="finger_tip.xml",
+        model="finger_tip",
         geom="wall",
         p_OC_O=(LENGTH / 2 - DEPTH, 0.0, radius),
         normal_O=(0.0, 0.0, -side),
@@ -124,19 +124,21 @@ SCENARIO = Scenario(
             friction=RIM_FRICTION,
         ),
     ),
-    robot=Robot(
-        model="gripper.xml",
-        posture={
-            "slide_x": LENGTH - DEPTH + _TIP_TO_WRIST,
-            "slide_y": 0.0,
-            "slide_z": OUTER + (OUTER + INNER) / 2,
-            "wrist_pitch": 0.0,
-            "wrist_yaw": 0.0,
-            "wrist_roll": 0.0,
-            "outer_finger": _FINGER_Q,
-            "inner_finger": _FINGER_Q,
-        },
-        still=("outer_finger", "inner_finger"),
+    robots=(
+        Robot(
+            model="gripper",
+            posture={
+                "slide_x": LENGTH - DEPTH + _TIP_TO_WRIST,
+                "slide_y": 0.0,
+                "slide_z": OUTER + (OUTER + INNER) / 2,
+                "wrist_pitch": 0.0,
+                "wrist_yaw": 0.0,
+                "wrist_roll": 0.0,
+                "outer_finger": _FINGER_Q,
+                "inner_finger": _FINGER_Q,
+            },
+            still=("outer_finger", "inner_finger"),
+        ),
     ),
     path=Pivot(
         start=Pose((LENGTH / 2, 0.0, OUTER)),

@@ -22,8 +22,8 @@ _NAMED = 6
 
 
 def scenario_markdown(scenario: Scenario) -> str:
-    """Object, contacts, robot, path and phases of a scenario."""
-    thing, path = scenario.object, scenario.path
+    """Object, robots, contacts, path and phases of a scenario."""
+    thing, path, robots = scenario.object, scenario.path, scenario.robots
     contacts = [
         (
             hand.name,
@@ -59,9 +59,12 @@ def scenario_markdown(scenario: Scenario) -> str:
     return page(
         f"**{escaped(scenario.name)}**: {escaped(scenario.summary)}",
         f"Object {escaped(thing.name)}: {number(thing.mass)} kg ({number(thing.mass * GRAVITY)} N)"
-        f", centre of mass at ({_numbers(thing.center_of_mass)}) m. Robot "
-        f"{escaped(scenario.robot.model)}, {len(scenario.robot.posture)} joints. Tilt by "
+        f", centre of mass at ({_numbers(thing.center_of_mass)}) m. Tilt by "
         f"{number(path.angle_deg)} deg.",
+        table(
+            ("robot", "stands at [m]", "driven joints"),
+            [(r.prefix + r.model, _numbers(r.base.position), len(r.posture)) for r in robots],
+        ),
         table(
             ("contact", "what", "μ", "e_n [m]", "f_n at most [N]", "place on the object [m]"),
             contacts,

@@ -6,6 +6,10 @@ import math
 from dataclasses import dataclass, replace
 
 from sim.checks import axes, length, not_negative, positive, vector
+from sim.manipulator import Robot as Robot
+from sim.pose import Pose as Pose
+from sim.pose import Quaternion as Quaternion
+from sim.pose import Vector as Vector
 from sim.settings import (
     FARTHEST_M,
     HOLD,
@@ -20,24 +24,6 @@ from sim.settings import (
 from synthesis import InvalidInputError
 
 GRAVITY = 9.81  # [m/s^2]
-
-Vector = tuple[float, float, float]
-Quaternion = tuple[float, float, float, float]
-
-
-@dataclass(frozen=True)
-class Pose:
-    """A frame's position [m] and orientation (quaternion wxyz) in its parent frame."""
-
-    position: Vector = (0.0, 0.0, 0.0)
-    quaternion: Quaternion = (1.0, 0.0, 0.0, 0.0)
-
-    def __post_init__(self) -> None:
-        vector("pose.position", self.position, 3)
-        vector("pose.quaternion", self.quaternion, 4)
-        # They are normalised where they are used, if their squares are numbers.
-        if not 1e-3 < math.hypot(*self.quaternion) < 1e3:
-            raise InvalidInputError("pose.quaternion", self.quaternion, "a quaternion of length 1")
 
 
 @dataclass(frozen=True)
@@ -127,15 +113,16 @@ class Hand:
 
     Attributes:
         name: Name of the contact and prefix of the hand's parts.
-        mount: Body of the robot that carries the hand.
-        model: Asset with a body ``pad`` that has a spherical geom ``tip`` and a site
-            ``tip_center``.
+        mount: Body of a robot that carries the hand, with the robot's prefix.
+        model: Name of one that ships (see ``assets.HANDS``), or path of an MJCF file with a body
+            ``pad`` that has a spherical geom ``tip`` and a site ``tip_center``.
         geom: The object's geom that is touched.
         p_OC_O: Contact point in the object frame [m].
         normal_O: Inward normal in the object's axes.
         tangent_O: First tangent in the object's axes, perpendicular to the normal.
         friction: Between tip and object.
         f_n_max: Largest allowed normal force [N].
+        mount_pose: Of the body ``pad`` on the mount.
     """
 
     name: str
@@ -147,6 +134,7 @@ class Hand:
     tangent_O: Vector
     friction: Friction
     f_n_max: float = math.inf
+    mount_pose: Pose = Pose()
 
     def __post_init__(self) -> None:
         axes(self.name, ("normal_O", self.normal_O), ("tangent_O", self.tangent_O))
@@ -195,36 +183,6 @@ class Rest:
     geom: str
     surface: str
     friction: Friction
-
-
-@dataclass(frozen=True)
-class Robot:
-    """The robot, its place and its start posture.
-
-    Attributes:
-        model: Asset (MJCF); joint speed limits are the joints' ``user`` number.
-        description: The URDF in example-robot-data whose meshes recordings show; None for none.
-        base: Pose of the model's root in the world.
-        posture: Start angle [rad or m] of every joint that is driven, from which inverse
-            kinematics seeks; the other joints are locked at 0.
-        still: Joints that move along the path only if the others cannot do it alone: the fingers
-            of a gripper, whose wrist carries them.
-        start_deviation: Standard deviation of the start posture from the planned one [rad or m],
-            drawn by the run's seed.
-    """
-
-    model: str
-    posture: dict[str, float]
-    description: str | None = None
-    still: tuple[str, ...] = ()
-    base: Pose = Pose()
-    start_deviation: float = 1e-4
-
-    def __post_init__(self) -> None:
-        for joint, angle in self.posture.items():
-            if not math.isfinite(angle):
-                raise InvalidInputError(f"robot.posture.{joint}", angle, "a finite number")
-        not_negative("robot.start_deviation", self.start_deviation)
 
 
 @dataclass(frozen=True)
@@ -280,7 +238,7 @@ class Scenario:
     environment: tuple[Geom, ...]
     hands: tuple[Hand, ...]
     supports: tuple[Support, ...]
-    robot: Robot
+    robots: tuple[Robot, ...]
     path: Pivot
     rests: tuple[Rest, ...] = ()
     phases: tuple[Phase, ...] = (*REACH, *TILT, *HOLD)
@@ -300,6 +258,11 @@ class Scenario:
         for name in self.contact_names:
             if self.contact_names.count(name) > 1:
                 raise InvalidInputError("contact names", name, "a name that no other contact has")
+        prefixes = [robot.prefix for robot in self.robots]
+        for prefix in prefixes:
+            if prefixes.count(prefix) > 1:
+                valid = "a prefix that no other robot has"
+                raise InvalidInputError("robot.prefix", repr(prefix), valid)
         geoms = [g.name for g in self.object.geoms]
         touched = [(hand.name, hand.geom) for hand in self.hands]
         touched += [(support.name, support.geom) for support in self.supports]
@@ -321,6 +284,22 @@ class Scenario:
     def contact_names(self) -> tuple[str, ...]:
         """Names of all contacts, hands first: the order of every per-contact array."""
         return (*(hand.name for hand in self.hands), *(support.name for support in self.supports))
+
+    @property
+    def posture(self) -> dict[str, float]:
+        """Start angle [rad or m] of every driven joint of all robots, by its name in the scene."""
+        robots = self.robots
+        return {r.prefix + joint: angle for r in robots for joint, angle in r.posture.items()}
+
+    @property
+    def still(self) -> tuple[str, ...]:
+        """Joints that keep still where they can, by their names in the scene."""
+        return tuple(robot.prefix + joint for robot in self.robots for joint in robot.still)
+
+    @property
+    def start_deviation(self) -> dict[str, float]:
+        """Standard deviation of every driven joint's start [rad or m], by its name in the scene."""
+        return {r.prefix + joint: r.start_deviation for r in self.robots for joint in r.posture}
 
     def _repr_markdown_(self) -> str:
         from sim.notebook import scenario_markdown
