@@ -136,12 +136,12 @@ class Run(Chosen):
         from sim.execution import planned_tilt
         from sim.preparation import Preparation
         from sim.run import Request
-        from sim.settings import stretched
+        from sim.settings import default_controller, stretched
         from synthesis.errors import InvalidInputError
 
         chosen = self.chosen()
         planning, prepared = chosen_planning(self.plan, self.stretch), None
-        controller = "robust" if planning is None else "dynamic"
+        controller = default_controller(planning is not None)
         if self.controller is not None:
             controller = self.controller
         control = chosen_control(chosen, controller, self.objective)

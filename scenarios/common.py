@@ -72,14 +72,10 @@ def chosen_control(scenario: Scenario, controller: str, objective: str | None) -
     Raises:
         InvalidInputError: There is no such controller or objective.
     """
-    from sim.settings import controllers
-    from synthesis.errors import InvalidInputError
+    from sim.settings import controller as named
     from synthesis.problem import Objective
 
-    known = controllers(scenario.control)
-    if controller not in known:
-        raise InvalidInputError("--controller", controller, f"one of {', '.join(known)}")
-    control = known[controller]
+    control = named(scenario.control, controller, "--controller")
     if objective is None:
         return control
     return replace(control, objective=one_of(Objective, "--objective", objective))

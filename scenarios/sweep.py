@@ -77,7 +77,6 @@ class Sweep(Chosen):
         from sim.sweep.farm import Workers, run_sweep
         from sim.sweep.picture import draw_map
         from sim.sweep.store import MAP, SUMMARY, Store
-        from sim.sweep.summary import scores
 
         workers = Workers(self.workers, self.scheduler)
         try:
@@ -91,9 +90,9 @@ class Sweep(Chosen):
         before, started = len(store.missing()), time.perf_counter()
         try:
             with progress_bar(sweep.scenario.name) as move:
-                rows = run_sweep(
+                outcome = run_sweep(
                     sweep,
-                    store,
+                    folder,
                     workers,
                     lambda done, total, failures: move(
                         done, total, f"{done} of {total}, {failures} failed"
@@ -109,9 +108,8 @@ class Sweep(Chosen):
             )
             return INTERRUPTED
         minutes = (time.perf_counter() - started) / 60.0
-        hands = tuple(hand.name for hand in sweep.scenario.hands)
-        found = scores(rows, hands)
-        draw_map(rows, sweep, pair, store.folder / MAP)
+        found = outcome.scores
+        draw_map(outcome.rows, sweep, pair, store.folder / MAP)
         summary = {
             "scenario": sweep.scenario.name,
             "preset": self.preset,
