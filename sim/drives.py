@@ -58,7 +58,8 @@ class Drives:
         self._setpoint = Setpoint(*none)
         self._share, self._tau_held, self.w_held = math.nan, self.tau_g, self._setpoint.w_OC_C
         # Deviations of angles and speeds, and torques per each of them: both terms in one product.
-        self._deviation, self._gains = np.zeros((2, joints)), np.zeros((joints, 2, joints))
+        self._deviations, self._gains = np.zeros(2 * joints), np.zeros((joints, 2 * joints))
+        self._q_off, self._qd_off = self._deviations[:joints], self._deviations[joints:]
         self._sent = np.zeros(joints)
         self._reaction, self._extra = GripReaction(scenario, control, robot), 0.0
         self._update_s = control.solve_every * scenario.physics.timestep
@@ -81,7 +82,8 @@ class Drives:
         )
         if self._control.yielding_squeeze:
             mass_matrix = self._without_squeeze(mass_matrix)
-        self._gains[:, 0], self._gains[:, 1] = self._reaction.braced(mass_matrix, omega)
+        stiffness, damping = self._reaction.braced(mass_matrix, omega)
+        self._gains[:, : len(q)], self._gains[:, len(q) :] = stiffness, damping
         self.tau_g = self._robot.gravity()
         if target is not None and target.qdd is not None:
             self.tau_g = self.tau_g + self._robot.motion_torques(target.qd, target.qdd)
@@ -131,11 +133,11 @@ class Drives:
             share: Of the setpoint's forces that is applied [-].
             dead: Joints without impedance, (l,); None if there are none.
         """
-        np.subtract(target.q, measurement.q, self._deviation[0])
-        np.subtract(target.qd, measurement.qd, self._deviation[1])
+        np.subtract(target.q, measurement.q, self._q_off)
+        np.subtract(target.qd, measurement.qd, self._qd_off)
         if dead is not None:
-            self._deviation[:, dead] = 0.0
-        pull = self._gains.reshape(len(target.q), -1).dot(self._deviation.reshape(-1))
+            self._q_off[dead] = self._qd_off[dead] = 0.0
+        pull = self._gains.dot(self._deviations)
         if dead is not None:
             pull[dead] = 0.0
         self.tau_pull = pull
