@@ -44,6 +44,8 @@ class Drives:
     Attributes:
         tau_g: Torques that hold the robot up, and where inertia counts also make its motion, as of
             the last update of the model (l,).
+        tau: Torques that were last asked for, within the limits (l,).
+        saturated: Which of them were cut at their limit, (l,).
         tau_pull: Torques with which the impedance last pulled the joints to their path (l,).
         w_held: Wrenches on the object that the last torques were to make [N, N·m], (m, 6).
     """
@@ -52,7 +54,8 @@ class Drives:
         """Takes over the model of the robot, which whoever updates it shares."""
         self._robot, self._control = robot, control
         joints = len(robot.joints)
-        self.tau_g, self.tau_pull = np.zeros((2, joints))
+        self.tau_g, self.tau_pull, self.tau = np.zeros((3, joints))
+        self.saturated = np.zeros(joints, bool)
         contacts, hands = len(scenario.contact_names), len(scenario.hands)
         none = np.zeros(joints), np.zeros((contacts, 6)), np.zeros((hands, 6, joints))
         self._setpoint = Setpoint(*none)
@@ -60,7 +63,6 @@ class Drives:
         # Deviations of angles and speeds, and torques per each of them: both terms in one product.
         self._deviations, self._gains = np.zeros(2 * joints), np.zeros((joints, 2 * joints))
         self._q_off, self._qd_off = self._deviations[:joints], self._deviations[joints:]
-        self._sent = np.zeros(joints)
         self._reaction, self._extra = GripReaction(scenario, control, robot), 0.0
         self._update_s = control.solve_every * scenario.physics.timestep
         # Setpoints by path time, in the order of both.
@@ -144,9 +146,10 @@ class Drives:
         tau = pull + self._robot.damping * target.qd
         tau += self._held(share)
         if math.isnan(tau.dot(tau)):  # a limit cuts infinities, but lets NaN pass
-            tau = np.where(np.isnan(tau), self._sent, tau)
-        self._sent = limited = np.minimum(np.maximum(tau, self._robot.tau_min), self._robot.tau_max)
-        return limited, limited != tau
+            tau = np.where(np.isnan(tau), self.tau, tau)
+        self.tau = np.minimum(np.maximum(tau, self._robot.tau_min), self._robot.tau_max)
+        self.saturated = self.tau != tau
+        return self.tau, self.saturated
 
     def _held(self, share: float) -> Array:
         """Torques that hold robot and object, as until the next setpoint or change of share."""

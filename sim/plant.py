@@ -190,8 +190,8 @@ class Plant:
 
     def contacts(self, positions: Array, wrenches: Array) -> int:
         """Adds up the plant's contacts; see :meth:`ContactReader.read`, here of one step."""
-        self._contacts.count = 0
-        self._contacts.append(0, self._model, self._data)
+        self._contacts.clear()
+        self._contacts.append(0, self._data)
         R_WO = self._data.xmat[self._object].reshape(1, 3, 3)
         collisions = self._reader.read(
             self._contacts,
@@ -204,7 +204,7 @@ class Plant:
 
     def log(self, step: int) -> None:
         """Keeps the last step, of an index in a block of steps, to be read with the block."""
-        self._contacts.append(step, self._model, self._data)
+        self._contacts.append(step, self._data)
         self._motion.append(step)
 
     def read(self, block: Trace) -> None:
@@ -218,4 +218,4 @@ class Plant:
         block.collisions[:] = self._reader.read(
             self._contacts, block.p_WO, rotations(block.quat_WO), block.p_WC, block.f_W
         )
-        self._contacts.count = 0
+        self._contacts.clear()
