@@ -143,22 +143,23 @@ class Drives:
         if dead is not None:
             pull[dead] = 0.0
         self.tau_pull = pull
-        tau = pull + self._robot.damping * target.qd
-        tau += self._held(share)
+        if share != self._share:
+            self._hold(share)
+        robot = self._robot
+        tau = pull + robot.damping * target.qd
+        tau += self._tau_held
         if math.isnan(tau.dot(tau)):  # a limit cuts infinities, but lets NaN pass
             tau = np.where(np.isnan(tau), self.tau, tau)
-        self.tau = np.minimum(np.maximum(tau, self._robot.tau_min), self._robot.tau_max)
+        self.tau = np.minimum(np.maximum(tau, robot.tau_min), robot.tau_max)
         self.saturated = self.tau != tau
         return self.tau, self.saturated
 
-    def _held(self, share: float) -> Array:
-        """Torques that hold robot and object, as until the next setpoint or change of share."""
-        if share != self._share:
-            self._share = share
-            self._tau_held = self.tau_g + share * self._setpoint.tau_f
-            self.w_held = share * self._setpoint.w_OC_C
-            if self._extra > 0.0:
-                squeeze = share * self._extra * self._reaction.direction
-                self._tau_held += squeeze @ self._setpoint.J_C[:, N]
-                self.w_held[: len(squeeze), N] += squeeze
-        return self._tau_held
+    def _hold(self, share: float) -> None:
+        """Finds what holds robot and object until the next setpoint or change of share."""
+        self._share = share
+        self._tau_held = self.tau_g + share * self._setpoint.tau_f
+        self.w_held = share * self._setpoint.w_OC_C
+        if self._extra > 0.0:
+            squeeze = share * self._extra * self._reaction.direction
+            self._tau_held += squeeze @ self._setpoint.J_C[:, N]
+            self.w_held[: len(squeeze), N] += squeeze
