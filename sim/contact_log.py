@@ -66,7 +66,7 @@ class ContactLog:
             column[: self.count, None] for column in (self._begin, self._address, self._dim)
         )
         forces = self._forces.take(begin + address + _COMPONENTS, mode="clip")
-        return np.where((address >= 0) & (_COMPONENTS < dim), forces, 0.0)
+        return np.where((address >= 0) & (dim > _COMPONENTS), forces, 0.0)
 
     def _grow(self) -> None:
         for name, array in vars(self).items():

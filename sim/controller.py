@@ -5,8 +5,6 @@ from __future__ import annotations
 import time
 from dataclasses import dataclass, replace
 
-import numpy as np
-
 from sim.channel import Channel, Setpoint
 from sim.clock import PathClock
 from sim.drives import Drives

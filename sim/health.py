@@ -129,7 +129,7 @@ class Health:
     def _joints(self, measurement: Measurement, target: Target, sent: Sent) -> list[Finding]:
         settings, t, found = self._settings, measurement.t, []
         # An arm whose weight alone is too much sags; what counts then is how far.
-        cut = np.count_nonzero(sent.saturated) > 0 and target.grip > 0.0
+        cut = bool(np.count_nonzero(sent.saturated)) and target.grip > 0.0
         if self._lasts(Cause.SATURATION, t, cut) > settings.saturated_s:
             joint = self._robot.joints[int(np.argmax(sent.saturated))]
             found.append(Finding(Cause.SATURATION, f"the torque of {joint} is cut at its limit"))
@@ -175,7 +175,7 @@ class Health:
 
     def _motors(self, t: float, made: Array, asked: Array) -> list[Finding]:
         wrong = np.abs(made - asked) > self._torque_error
-        if self._lasts(Cause.MOTOR, t, np.count_nonzero(wrong) > 0) <= _LASTING_S:
+        if self._lasts(Cause.MOTOR, t, bool(np.count_nonzero(wrong))) <= _LASTING_S:
             return []
         self._broken = wrong
         joint = int(np.argmax(wrong))
