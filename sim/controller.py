@@ -9,7 +9,7 @@ from sim.channel import Channel, Setpoint
 from sim.clock import PathClock
 from sim.drives import Drives
 from sim.grip import GripSchedule
-from sim.guard import RATES, Event, Mode, Supervisor
+from sim.guard import Event, Mode, Supervisor
 from sim.health import Health, Sent
 from sim.ik import JointPath
 from sim.inertia import inertial_wrenches
@@ -128,7 +128,7 @@ class Controller:
         """The torques for the next step."""
         supervisor, clock, drives = self._supervisor, self._clock, self._drives
         t, seen, mode = measurement.t, self._health.accept(measurement), supervisor.mode
-        path_t = clock.at(t, RATES[mode])
+        path_t = clock.at(t, supervisor.rate)
         target = self._references.at(path_t)
         if clock.rate != 1.0 or clock.change != 0.0:
             target = target.on_clock(clock.rate, clock.change)
@@ -185,7 +185,7 @@ class Controller:
             seen,
             target,
             Sent(drives.tau, drives.saturated, drives.tau_pull),
-            held=bool(self._held[target.phase]),
+            held=self._held[target.phase],
             failing_s=0.0 if self._failing_t is None else seen.t - self._failing_t,
             silent_s=seen.t - self._heard_t,
         )

@@ -143,7 +143,7 @@ class Plant:
         """
         if self._pushes or self._weights:
             self._push()
-        # As dm_control's own step, whose search for warnings takes a fifth as long as the step.
+        # As dm_control's own step, whose search for warnings takes a sixth as long as the step.
         mujoco.mj_step(self._model, self._data)
         if np.count_nonzero(self._warnings):
             names = np.compress(self._warnings, list(mujoco.mjtWarning.__members__))
