@@ -140,12 +140,13 @@ AnyObject = Annotated[
 class SurfaceTable(Placed):
     """Something that stands fast. The object may lie on it if its friction is given."""
 
-    kind: Literal["floor", "table", "wall", "step"]
-    """floor is a plane through position_m; table and step are boxes with position_m in the middle
-    of their top, wall one with it in the middle of its front."""
+    kind: Literal["floor", "table", "step", "post", "wall"]
+    """floor is a plane through position_m; table and step are boxes and post is a cylinder with
+    position_m in the middle of their top; wall is a box with it in the middle of its front."""
 
     size_m: Annotated[list[Positive], Len(2, 3)]
-    """Lengths along its x, y and z [m]; of a floor along x and y, as far as it is drawn."""
+    """Lengths along its x, y and z [m]; of a floor along x and y, as far as it is drawn; diameter
+    and height of a post."""
 
     facing: Literal["+x", "-x", "+y", "-y"] | None = None
     """Where the front of a wall looks; -x if it is left out."""

@@ -116,7 +116,7 @@ def make_surface(source: Source, name: str, surface: SurfaceTable) -> Geom:
     key: Key = ("environment", name)
     turned = orientation(source, key, surface)
     at, size = np.asarray(surface.position_m), surface.size_m
-    count = 2 if surface.kind == "floor" else 3
+    count = 2 if surface.kind in ("floor", "post") else 3
     if len(size) != count:
         raise source.error((*key, "size_m"), size, f"{count} lengths of a {surface.kind}")
     if surface.facing is not None and surface.kind != "wall":
@@ -126,10 +126,12 @@ def make_surface(source: Source, name: str, surface: SurfaceTable) -> Geom:
     if surface.kind == "floor":
         half = (size[0] / 2, size[1] / 2, _GRID)
         return Geom(name, "plane", half, Pose(vector(at), turned), rgba, surface.solid)
-    behind = -np.asarray(front(surface)) * size / 2
+    half_sizes = tuple(length / 2 for length in size)
+    lengths = (size[0], *size) if surface.kind == "post" else size
+    behind = -np.asarray(front(surface)) * lengths / 2
     pose = Pose(vector(apply(Pose(vector(at), turned), vector(behind))), turned)
-    half = (size[0] / 2, size[1] / 2, size[2] / 2)
-    return Geom(name, "box", half, pose, rgba, surface.solid)
+    kind = "cylinder" if surface.kind == "post" else "box"
+    return Geom(name, kind, half_sizes, pose, rgba, surface.solid)
 
 
 def front(surface: SurfaceTable) -> Vector:

@@ -11,7 +11,8 @@ from scipy.spatial.transform import Rotation
 
 from scenarios.file_errors import Key, Source, nearest
 from sim.scenario import Geom, Pose, Quaternion, Vector
-from sim.shapes import Box
+from sim.shape import Shape
+from sim.shapes import Box, Cylinder
 from synthesis.contact import Array
 
 # A contact that is farther off is not on the surface [m].
@@ -120,7 +121,7 @@ def surface_normal(geom: Geom, front: Vector, p_W: Array) -> tuple[Array, Array]
     """The point of a fixed surface that is closest to a point, and its normal there, outwards.
 
     Args:
-        geom: A plane, or a box.
+        geom: A plane, a box or a cylinder.
         front: Outward normal of its front, in its own axes: preferred where the point is on it.
         p_W: The point in the world [m], (3,).
 
@@ -130,10 +131,16 @@ def surface_normal(geom: Geom, front: Vector, p_W: Array) -> tuple[Array, Array]
     p = undo(geom.pose, p_W)
     if geom.kind == "plane":
         return apply(geom.pose, vector([p[0], p[1], 0.0])), turned(geom.pose, np.array(front))
-    box = Box(vector([2.0 * half for half in geom.size]))
-    place = box.closest(vector(p))
+    shape: Shape
+    if geom.kind == "cylinder":
+        radius, half_length = geom.size
+        shape, extent = Cylinder(radius, 2.0 * half_length), (radius, radius, half_length)
+    else:
+        shape = Box(vector([2.0 * half for half in geom.size]))
+        extent = vector(geom.size)
+    place = shape.closest(vector(p))
     normal = -np.asarray(place.normal)
-    at_front = np.asarray(front).dot(place.point) - np.abs(front).dot(geom.size)
+    at_front = np.asarray(front).dot(place.point) - np.abs(front).dot(extent)
     if abs(at_front) < ON_SURFACE:
         normal = np.asarray(front)
     return apply(geom.pose, place.point), turned(geom.pose, normal)

@@ -206,3 +206,23 @@ def test_a_mesh_beside_the_file_is_read_and_one_elsewhere_where_it_is_allowed(fo
     assert read(folder / "said.toml", (folder.parent,)).object.mass == mesh.object.mass
     code, _, errors = ended("explain said.toml --allow-path .. --tilt-deg 100", capsys)
     assert (code, "tilt: got 100" in errors) == (2, True)
+
+
+def test_a_post_is_a_cylinder_below_its_top(folder):
+    post = (
+        '[environment.post]\nkind = "post"\nsize_m = [0.1, 0.6]\nposition_m = [0.65, 0, 0]\n'
+        "friction = { mu = 0.5 }\n\n[environment.table]"
+    )
+    support = (
+        '[supports.on_post]\nsurface = "post"\npoint_m = [0, 0, -0.05]\n\n[supports.edge_left]'
+    )
+    s = said(folder, ("[environment.table]", post), ("[supports.edge_left]", support))
+    geom = s.environment[0]
+    assert (geom.kind, geom.size, geom.pose.position[2]) == ("cylinder", (0.05, 0.3), -0.3)
+    assert s.supports[0].normal_W == (0.0, 0.0, 1.0)
+    with pytest.raises(FileError, match="mm off post"):
+        said(
+            folder,
+            ("[environment.table]", post),
+            ("[supports.edge_left]", support.replace("[0, 0, -0.05]", "[0.1, 0, -0.05]")),
+        )
