@@ -32,7 +32,7 @@ def reference(schema: Schema) -> str:
 
 
 def _section(models: Schema, section: _Section) -> list[str]:
-    """Descriptions and keys; where there are several models, first the keys that all of them have."""
+    """Descriptions and keys; of several models first the keys that all of them have."""
     shared = _shared([models[name] for name in section.models])
     if len(section.models) == 1:
         (model,) = (models[name] for name in section.models)
