@@ -72,3 +72,75 @@ def test_what_a_browser_would_fetch_is_found(text):
 )
 def test_links_and_files_of_the_site_are_not(text):
     assert fetched(text) == []
+
+
+# --- the reference of scenario files ---
+
+SCHEMA = {
+    "anyOf": [{"$ref": "#/$defs/CrateFile"}],
+    "$defs": {
+        "CrateFile": {
+            "description": "A crate.",
+            "type": "object",
+            "required": ["lid"],
+            "properties": {
+                "lid": {"oneOf": [{"$ref": "#/$defs/FlatTable"}, {"$ref": "#/$defs/RoundTable"}]},
+                "pads": {"patternProperties": {"^[a-z]+$": {"$ref": "#/$defs/PadTable"}}},
+                "feet": {"type": "array", "items": {"$ref": "#/$defs/PadTable"}},
+                "mass_kg": {
+                    "anyOf": [{"type": "number", "exclusiveMinimum": 0.0}, {"type": "null"}],
+                    "default": None,
+                    "description": "What `it` weighs | or not [kg].",
+                },
+                "size_m": {"type": "array", "minItems": 2, "maxItems": 2, "default": [1.0, 2.0]},
+            },
+        },
+        "FlatTable": {
+            "description": "A flat lid.",
+            "type": "object",
+            "properties": {
+                "kind": {"const": "flat"},
+                "tight": {"type": "boolean", "default": True},
+            },
+        },
+        "RoundTable": {
+            "description": "A round lid.",
+            "type": "object",
+            "properties": {
+                "kind": {"const": "round"},
+                "tight": {"type": "boolean", "default": True},
+            },
+        },
+        "PadTable": {
+            "description": "A pad.",
+            "type": "object",
+            "properties": {"side": {"type": "string", "enum": ["left", "right"]}},
+        },
+    },
+}
+
+
+def test_every_table_of_a_schema_has_a_section_under_its_header():
+    text = hook("schema").reference(SCHEMA)
+    sections = [line for line in text.splitlines() if line.startswith("#")]
+    assert sections == [
+        "## crate file",
+        "### `[lid]`",
+        "### `[pads.NAME]`",
+        "### `[[feet]]`",
+    ]
+
+
+def test_keys_have_type_range_default_and_description():
+    text = hook("schema").reference(SCHEMA)
+    assert r"| `mass_kg` | number &gt; 0 |  | What `it` weighs \| or not \[kg\]. |" in text
+    assert "| `lid` | table | must be there |  |" in text
+    assert '| `side` | "left" or "right" |  |  |' in text
+    assert "1.0, 2.0" in text
+
+
+def test_keys_that_all_kinds_of_a_table_have_stand_there_once():
+    text = hook("schema").reference(SCHEMA)
+    assert text.count("| `tight` | true or false | true |") == 1
+    assert text.index("`tight`") < text.index("**A flat lid.**") < text.index("**A round lid.**")
+    assert '| `kind` | "round" |' in text[text.index("**A round lid.**") :]

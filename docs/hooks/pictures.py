@@ -33,7 +33,7 @@ def draw(scenario: Scenario) -> Image.Image:
     with mujoco.Renderer(model, _HEIGHT, _WIDTH) as renderer:
         for share in _SHARES:
             _pose(scenario, model, data, path, share, joints, arms)
-            renderer.update_scene(data, _camera(scenario))
+            renderer.update_scene(data, _camera(scenario, model))
             views.append(renderer.render())
     return Image.fromarray(np.concatenate(views, axis=1))
 
@@ -57,12 +57,12 @@ def _pose(
     mujoco.mj_forward(model, data)
 
 
-def _camera(scenario: Scenario) -> mujoco.MjvCamera:
+def _camera(scenario: Scenario, model: mujoco.MjModel) -> mujoco.MjvCamera:
     """The place that recordings look from."""
     eye, target = np.array(scenario.view.eye), np.array(scenario.view.target)
     look = target - eye
     camera = mujoco.MjvCamera()
-    camera.lookat[:] = np.array(scenario.path.point_W) + target
+    camera.lookat[:] = model.stat.center + target
     camera.distance = float(np.linalg.norm(look))
     camera.azimuth = float(np.degrees(np.arctan2(look[1], look[0])))
     camera.elevation = float(np.degrees(np.arcsin(look[2] / camera.distance)))
