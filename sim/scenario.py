@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
 
 from sim.checks import axes, length, not_negative, positive, vector
 from sim.manipulator import Robot as Robot
@@ -23,20 +24,25 @@ from sim.settings import (
 )
 from synthesis import InvalidInputError
 
+if TYPE_CHECKING:
+    from sim.shape import Shape
+
 GRAVITY = 9.81  # [m/s^2]
 
 
 @dataclass(frozen=True)
 class Geom:
-    """A primitive in MuJoCo's terms.
+    """A primitive in MuJoCo's terms, or a mesh, which touches as its convex hull does.
 
     Attributes:
         name: Unique in the scene.
-        kind: Geom type as MuJoCo names it: plane, sphere, capsule, ellipsoid, cylinder, box.
-        size: Sizes as MuJoCo reads them (half extents; radius, half length) [m].
+        kind: Geom type as MuJoCo names it: plane, sphere, capsule, ellipsoid, cylinder, box, mesh.
+        size: Sizes as MuJoCo reads them (half extents; radius, half length) [m]; of a mesh its
+            scale, as one number or one along each axis.
         pose: Pose in the frame of the owner (object or world).
         rgba: Colour and opacity, each 0 to 1; geoms of opacity 0 are not drawn.
         solid: Whether the robot must keep clear of it (but for tips where they hold the object).
+        file: Of a mesh; None for all others.
     """
 
     name: str
@@ -45,6 +51,7 @@ class Geom:
     pose: Pose = Pose()
     rgba: tuple[float, float, float, float] = (0.6, 0.6, 0.6, 1.0)
     solid: bool = True
+    file: str | None = None
 
     def __post_init__(self) -> None:
         for size in self.size:
@@ -52,6 +59,9 @@ class Geom:
         if not 1 <= len(self.size) <= 3:
             raise InvalidInputError(f"{self.name}.size", self.size, "one to three numbers")
         vector(f"{self.name}.rgba", self.rgba, 4)
+        if (self.kind == "mesh") != (self.file is not None):
+            valid = "a file for the kind mesh, and none for any other"
+            raise InvalidInputError(f"{self.name}.file", self.file, valid)
 
 
 @dataclass(frozen=True)
@@ -61,9 +71,11 @@ class Object:
     Attributes:
         name: What people call it.
         mass: [kg].
-        inertia: Principal moments about the centre of mass, along the object's axes [kg m^2].
+        inertia: Principal moments about the centre of mass [kg m^2].
         center_of_mass: In the object frame [m].
-        geoms: Its shape; contacts refer to these by name.
+        geoms: What it is made of; contacts refer to these by name.
+        principal_axes: Orientation of the principal axes in the object frame, wxyz.
+        shape: What its geoms stand for, if it is a shape of :mod:`sim.shapes`.
     """
 
     name: str
@@ -71,6 +83,8 @@ class Object:
     inertia: Vector
     geoms: tuple[Geom, ...]
     center_of_mass: Vector = (0.0, 0.0, 0.0)
+    principal_axes: Quaternion = (1.0, 0.0, 0.0, 0.0)
+    shape: Shape | None = None
 
     def __post_init__(self) -> None:
         positive(f"{self.name}.mass", self.mass)
@@ -78,6 +92,7 @@ class Object:
         for moment in self.inertia:
             positive(f"{self.name}.inertia", moment)
         vector(f"{self.name}.center_of_mass", self.center_of_mass, 3)
+        Pose(quaternion=self.principal_axes)
 
     def weighing(self, factor: float) -> Object:
         """The object with so many times the mass, and inertia in proportion."""

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from assets.mjcf import LOOKS
 from assets.models import hand_spec, robot_spec
 from assets.packages import ModelError
+from sim.meshes import check_contacts, read_mesh
 from sim.scenario import GRAVITY, Friction, Geom, Hand, Robot, Scenario
 from synthesis import InvalidInputError
 
@@ -22,7 +23,7 @@ _SOLVER_TOLERANCE = 1e-10
 
 _GEOM_TYPES = {
     kind: getattr(mujoco.mjtGeom, f"mjGEOM_{kind.upper()}")
-    for kind in ("plane", "sphere", "capsule", "ellipsoid", "cylinder", "box")
+    for kind in ("plane", "sphere", "capsule", "ellipsoid", "cylinder", "box", "mesh")
 }
 
 
@@ -40,13 +41,14 @@ def compose(scenario: Scenario, motion: ObjectMotion = ObjectMotion.FREE) -> muj
         InvalidInputError: The scenario names a joint, mount, part of a hand or geom type that does
             not exist, or a start angle outside its joint's range, or MuJoCo refuses the scene.
     """
+    check_contacts(scenario)
     spec = _robots(scenario)
     for hand in scenario.hands:
         _add_hand(spec, hand)
     spec.modelname = scenario.name
     _set_options(spec, scenario)
     for geom in scenario.environment:
-        _add_geom(spec.worldbody, geom)
+        _add_geom(spec, spec.worldbody, geom)
     _add_object(spec, scenario, motion)
     if motion is ObjectMotion.FREE:
         _add_pairs(spec, scenario)
@@ -203,13 +205,18 @@ def _add_hand(spec: mujoco.MjSpec, hand: Hand) -> None:
     frame.attach_body(model.body("pad"), f"{hand.name}_", "")
 
 
-def _add_geom(body: mujoco.MjsBody, geom: Geom) -> None:
+def _add_geom(spec: mujoco.MjSpec, body: mujoco.MjsBody, geom: Geom) -> None:
     if geom.kind not in _GEOM_TYPES:
         raise InvalidInputError(f"{geom.name}.kind", geom.kind, f"one of {', '.join(_GEOM_TYPES)}")
+    shape: dict[str, Any] = {"size": [*geom.size, 0.0, 0.0][:3]}
+    if geom.file is not None:
+        read = read_mesh(f"{geom.name}.file", geom.file, geom.size)
+        spec.add_mesh(name=geom.name, uservert=read.vertices.ravel(), userface=read.faces.ravel())
+        shape = {"meshname": geom.name}
     body.add_geom(
         name=geom.name,
         type=_GEOM_TYPES[geom.kind],
-        size=[*geom.size, 0.0, 0.0][:3],
+        **shape,
         pos=geom.pose.position,
         quat=geom.pose.quaternion,
         rgba=geom.rgba,
@@ -227,6 +234,7 @@ def _add_object(spec: mujoco.MjSpec, scenario: Scenario, motion: ObjectMotion) -
         quat=start.quaternion,
         mass=thing.mass,
         ipos=thing.center_of_mass,
+        iquat=thing.principal_axes,
         inertia=thing.inertia,
         explicitinertial=True,
         mocap=motion is ObjectMotion.POSED,
@@ -234,7 +242,7 @@ def _add_object(spec: mujoco.MjSpec, scenario: Scenario, motion: ObjectMotion) -
     if motion is ObjectMotion.FREE:
         body.add_freejoint(name=thing.name)
     for geom in thing.geoms:
-        _add_geom(body, geom)
+        _add_geom(spec, body, geom)
 
 
 def _add_pairs(spec: mujoco.MjSpec, scenario: Scenario) -> None:

@@ -8,6 +8,7 @@ from dataclasses import replace
 import mujoco
 import numpy as np
 import rerun as rr
+from scipy.spatial.transform import Rotation
 
 from assets.mjcf import LOOKS
 from assets.models import looks_of
@@ -129,6 +130,8 @@ def _transform(X: Array) -> rr.Transform3D:
 def _shape(model: mujoco.MjModel, g: int) -> rr.AsComponents:
     geom = model.geom(g)
     size = geom.size
+    if geom.type[0] == mujoco.mjtGeom.mjGEOM_MESH:
+        return _mesh(model, g)
     placed = {
         "centers": [geom.pos],
         "quaternions": [rr.Quaternion(xyzw=np.roll(geom.quat, -1))],
@@ -151,3 +154,19 @@ def _shape(model: mujoco.MjModel, g: int) -> rr.AsComponents:
         case _:
             half = [x or _PLANE_SIZE / 2 for x in size[:2]]
             return rr.Boxes3D(half_sizes=[[*half, _PLANE_THICKNESS / 2]], **placed)
+
+
+def _mesh(model: mujoco.MjModel, g: int) -> rr.AsComponents:
+    """A mesh geom in its body's frame, with flat faces."""
+    geom, mesh = model.geom(g), model.mesh(int(model.geom_dataid[g]))
+    vertices = slice(int(mesh.vertadr[0]), int(mesh.vertadr[0] + mesh.vertnum[0]))
+    faces = slice(int(mesh.faceadr[0]), int(mesh.faceadr[0] + mesh.facenum[0]))
+    turned = Rotation.from_quat(geom.quat, scalar_first=True).apply(model.mesh_vert[vertices])
+    corners = (geom.pos + turned)[model.mesh_face[faces]]
+    normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), np.finfo(float).tiny)
+    return rr.Mesh3D(
+        vertex_positions=corners.reshape(-1, 3).astype(np.float32),
+        vertex_normals=np.repeat(normals, 3, axis=0).astype(np.float32),
+        albedo_factor=(255 * geom.rgba).astype(np.uint8),
+    )
