@@ -46,10 +46,17 @@ class Sweep(Chosen):
     a plan those that count with inertia, else those that do not."""
 
     plan: str | None = None
-    """least-time: plan the tilt, and execute that in every world."""
+    """least-time, least-effort or friction-margin: plan the tilt, and execute that in every
+    world."""
 
     stretch: float = 1.0
     """By how much the planned duration is stretched."""
+
+    robust: bool = False
+    """The plan also serves the uncertainty set of controller robust, or as much as it can."""
+
+    duration: float | None = None
+    """The longest that a plan may take [s]; the scenario's own if left out."""
 
     grid: str = ""
     """What to set of every world drawn, like friction=0.7:1.3:7,weight=0.8,1.0,1.2 (factors)."""
@@ -140,7 +147,9 @@ class Sweep(Chosen):
         from sim.sweep.design import Sweep as Design
         from sim.sweep.parameters import parse_grid
 
-        chosen, planning = self.chosen(), chosen_planning(self.plan, self.stretch)
+        chosen = self.chosen()
+        asked = self.plan, self.stretch, self.duration, self.robust
+        planning = chosen_planning(chosen, *asked)
         if planning is not None:
             chosen = planned_tilt(chosen, planning).scenario
         if self.controllers is None:
@@ -178,8 +187,8 @@ class Sweep(Chosen):
         words = ["fulcrum", "sweep", *self.words]
         for field in dataclasses.fields(self):
             value = folder if field.name == "out" else getattr(self, field.name)
-            if field.name not in ("scenario", "allow_path") and value not in (None, ""):
-                words += [f"--{field.name}", str(value)]
+            if field.name not in ("scenario", "allow_path") and value not in (None, "", False):
+                words += [f"--{field.name}"] if value is True else [f"--{field.name}", str(value)]
         return shlex.join(words)
 
 
