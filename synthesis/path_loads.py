@@ -23,8 +23,8 @@ from synthesis.path_problem import PathObjective, PathProblem
 from synthesis.path_solution import ACTIVE, PathSolution
 from synthesis.path_synthesizer import solve_path
 
-# Points of the coarse grid.
-_COARSE = 21
+# Points of the coarse grid, at most and as a share of all.
+_COARSE, _SHARE = 21, 1.0 / 3.0
 # What the solver's accuracy may add to a friction cone, in units of the largest load [-].
 _SERVED = 1e-7
 # From so many known forces those with another load are made, at most.
@@ -42,8 +42,9 @@ def solve_many(problem: PathProblem) -> PathSolution:
     if len(problem.loads) == 1 or problem.objective is PathObjective.LEAST_EFFORT:
         return solve_path(problem)  # effort counts with every load
     chosen, points = [0], len(problem.s)
-    if points > 2 * _COARSE:
-        coarse = np.linspace(0, points - 1, _COARSE).round().astype(int)
+    count = min(_COARSE, round(_SHARE * points))
+    if count > 2:
+        coarse = np.linspace(0, points - 1, count).round().astype(int)
         # Where a coarse grid leaves no room the fine one decides.
         with contextlib.suppress(InfeasiblePathError):
             chosen = _binding(solve_path(problem.at(coarse)))

@@ -20,7 +20,7 @@ SET = UncertaintySet(mass=0.2, center=(0.02, 0.0, 0.02), friction=0.2)
 
 @pytest.fixture(scope="module")
 def uncertain():
-    """The box on a grid that is fine enough for a coarse one, with nine loads."""
+    """The box with nine loads."""
     return path_problem(scenario(BOX), MARGINS[BOX], 45, SET, curve=fastest(BOX).q)[0]
 
 
