@@ -16,7 +16,16 @@ if TYPE_CHECKING:
 DESCRIPTIONS = "example-robot-data"
 """The wheel that holds the official descriptions; pure data, nothing in it can be imported."""
 
-_MESH_URI = "package://example-robot-data/robots/"
+ROBOTS: dict[str, str | None] = {
+    "baxter": "baxter_description/urdf/baxter.urdf",
+    "gripper": None,
+    "panda": "panda_description/urdf/panda.urdf",
+    "ur5": "ur_description/urdf/ur5_robot.urdf",
+}
+"""The robots that ship, each with the description whose meshes recordings show."""
+HANDS = ("finger_tip", "palm_pad")
+"""The hands that ship."""
+
 _HERE = Path(__file__).parent
 
 
@@ -59,18 +68,6 @@ def description_path(relative: str) -> Path:
             f"({DESCRIPTIONS} {wheel.version})."
         )
     return path
-
-
-def mesh_path(uri: str) -> Path:
-    """Path of a mesh that a URDF among the descriptions names.
-
-    Raises:
-        ValueError: If the URI does not point into the installed descriptions.
-        FileNotFoundError: If the file is missing.
-    """
-    if not uri.startswith(_MESH_URI):
-        raise ValueError(f"mesh: got {uri!r}; valid starts with {_MESH_URI}.")
-    return description_path(uri.removeprefix(_MESH_URI))
 
 
 def velocity_limits(model: mujoco.MjModel) -> dict[str, float]:

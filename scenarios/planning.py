@@ -7,9 +7,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-import tyro
-
-from scenarios.common import FAILED, PASSED, asked_planning, results_folder
+from scenarios.common import FAILED, PASSED, Chosen, asked_planning, results_folder
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -24,11 +22,8 @@ _LISTED = 0.5
 
 
 @dataclass(frozen=True)
-class Plan:
+class Plan(Chosen):
     """Plan the fastest, easiest or safest tilt, with the forces along it; draw and write it."""
-
-    scenario: tyro.conf.Positional[str]
-    """Name of the scenario (see `fulcrum list`)."""
 
     objective: str = "least-time"
     """least-time, least-effort or friction-margin."""
@@ -71,14 +66,13 @@ class Plan:
         """Does it; returns the exit code: 1 if there is no such plan."""
         from rich.console import Console
 
-        from scenarios import scenario
         from sim.execution import made_plan
         from sim.files import write_json
         from sim.plan import PlanError
         from sim.plan_file import plan_content
         from sim.plan_picture import draw
 
-        chosen = scenario(self.scenario)
+        chosen = self.chosen()
         planning = asked_planning(
             chosen,
             "--objective",
@@ -89,7 +83,7 @@ class Plan:
             self.points,
         )
         margins = self._margins(chosen)
-        out = results_folder(self.out, f"{self.scenario}-plan")
+        out = results_folder(self.out, f"{chosen.name}-plan")
         try:
             planned = made_plan(chosen, margins, planning)
         except PlanError as error:

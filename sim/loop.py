@@ -13,7 +13,7 @@ from sim.controller import Controller
 from sim.grip import GripSchedule
 from sim.guard import Event
 from sim.ik import JointPath, plan_joints
-from sim.path import ScrewPath
+from sim.path import object_path
 from sim.plant import Measurement, Plant
 from sim.replanning import Replanner
 from sim.robot import RobotModel
@@ -74,7 +74,7 @@ class ClosedLoop:
             RobustInfeasibleError: No grip holds even the nominal object somewhere on the path.
             DivergedError: The start's state is more than numbers can hold.
         """
-        self._path = ScrewPath(scenario.path)
+        self._path = object_path(scenario.path)
         self.robot = robot = RobotModel(scenario)
         joint_path = joint_path or plan_joints(scenario)
         self.truth = world.truth(truth or scenario)
@@ -86,7 +86,7 @@ class ClosedLoop:
         self._sensors = Sensors(world, self._plant.joints)
         deviation = np.random.default_rng(seed).normal(size=len(robot.joints))
         try:
-            self._plant.reset(joint_path.start + scenario.robot.start_deviation * deviation)
+            self._plant.reset(joint_path.start + robot.start_deviation * deviation)
         except PhysicsError as error:
             raise DivergedError(0.0) from error
         self._dt = dt = self.truth.physics.timestep

@@ -195,6 +195,11 @@ class Plan:
             worst = max(broken, key=lambda name: broken[name][0])
             raise PlanError(self.scenario.name, what, [(worst, broken[worst][1])])
 
+    def _repr_markdown_(self) -> str:
+        from sim.notebook import plan_markdown
+
+        return plan_markdown(self)
+
 
 def plan(
     scenario: Scenario,

@@ -14,7 +14,7 @@ from sim.checks import not_negative, positive
 from sim.contacts import contacts
 from sim.ik import JointPath, plan_joints
 from sim.inertia import inertial_wrenches
-from sim.path import ScrewPath
+from sim.path import ObjectPath, object_path
 from sim.robot import RobotModel
 from sim.scenario import Object, Scenario
 from sim.settings import Control
@@ -92,7 +92,7 @@ def path_problem(
     Raises:
         PathError: The arms cannot follow the path.
     """
-    robot, path = RobotModel(scenario), ScrewPath(scenario.path)
+    robot, path = RobotModel(scenario), object_path(scenario.path)
     gripped = _gripped(scenario, margins.grip_max)
     control = Control(friction_factor=margins.friction_factor, preload=margins.grip_min)
     believed = Statics(gripped, control, robot)
@@ -149,7 +149,7 @@ def _corners(thing: Object, uncertainty: UncertaintySet) -> list[Object]:
     ]
 
 
-def _inertia(scenario: Scenario, thing: Object, path: ScrewPath, s: Array) -> tuple[Array, Array]:
+def _inertia(scenario: Scenario, thing: Object, path: ObjectPath, s: Array) -> tuple[Array, Array]:
     """Wrenches that accelerate an object, by the share's acceleration and squared rate, (K, 6)."""
     world = replace(scenario, object=thing)
     wrenches = np.array([inertial_wrenches(world, path, path.end * x) for x in s])
@@ -192,7 +192,7 @@ def _within(problem: Problem, share: float) -> Problem:
 
 
 def _tips(
-    scenario: Scenario, margins: Margins, path: ScrewPath, s: Array
+    scenario: Scenario, margins: Margins, path: ObjectPath, s: Array
 ) -> tuple[Rates, Accelerations]:
     """Speeds and accelerations of the hands' contacts, which go with the object."""
     places = [np.asarray(hand.p_OC_O) for hand in scenario.hands]

@@ -1,14 +1,22 @@
-"""Composes a MuJoCo scene from a scenario's data: robot, hands, object, environment, contacts."""
+"""Composes a MuJoCo scene from a scenario's data: robots, hands, object, environment, contacts."""
 
 from __future__ import annotations
 
+import math
+from collections.abc import Callable
 from enum import StrEnum
+from typing import Any
 
 import mujoco
 import numpy as np
+from numpy.typing import NDArray
 
-from assets import asset_path
-from sim.scenario import GRAVITY, Friction, Geom, Hand, Scenario
+from assets.mjcf import LOOKS
+from assets.models import hand_spec, robot_spec
+from assets.packages import ModelError
+from sim.meshes import check_contacts, read_mesh
+from sim.path import check_supports
+from sim.scenario import GRAVITY, Friction, Geom, Hand, Robot, Scenario
 from synthesis import InvalidInputError
 
 # Solver tolerance of both the main and the noslip solver; tight, for runs are compared bit by bit.
@@ -16,7 +24,7 @@ _SOLVER_TOLERANCE = 1e-10
 
 _GEOM_TYPES = {
     kind: getattr(mujoco.mjtGeom, f"mjGEOM_{kind.upper()}")
-    for kind in ("plane", "sphere", "capsule", "ellipsoid", "cylinder", "box")
+    for kind in ("plane", "sphere", "capsule", "ellipsoid", "cylinder", "box", "mesh")
 }
 
 
@@ -34,11 +42,15 @@ def compose(scenario: Scenario, motion: ObjectMotion = ObjectMotion.FREE) -> muj
         InvalidInputError: The scenario names a joint, mount, part of a hand or geom type that does
             not exist, or a start angle outside its joint's range, or MuJoCo refuses the scene.
     """
-    spec = _robot_with_hands(scenario)
+    check_contacts(scenario)
+    check_supports(scenario)
+    spec = _robots(scenario)
+    for hand in scenario.hands:
+        _add_hand(spec, hand)
     spec.modelname = scenario.name
     _set_options(spec, scenario)
     for geom in scenario.environment:
-        _add_geom(spec.worldbody, geom)
+        _add_geom(spec, spec.worldbody, geom)
     _add_object(spec, scenario, motion)
     if motion is ObjectMotion.FREE:
         _add_pairs(spec, scenario)
@@ -76,13 +88,24 @@ def unwanted_pairs(scenario: Scenario, scene: mujoco.MjModel) -> list[tuple[str,
     surroundings = {g.name: g for g in (*scenario.object.geoms, *scenario.environment)}
     touching = {(tip_geom(hand), hand.geom) for hand in scenario.hands}
     geoms = [scene.geom(g) for g in range(scene.ngeom)]
-    links = [g.name for g in geoms if scene.body_weldid[g.bodyid[0]] != 0]
+    links = [g.name for g in geoms if scene.body_weldid[g.bodyid[0]] != 0 and is_solid(g)]
     return [
         (link, other)
         for link in links
         for other in surroundings
         if link not in surroundings and (link, other) not in touching and surroundings[other].solid
     ]
+
+
+def is_solid(geom: Any) -> bool:
+    """Whether a compiled scene's geom may touch others, rather than only show what a link is."""
+    return int(geom.group[0]) != LOOKS
+
+
+def joint_ranges(scene: mujoco.MjModel) -> NDArray[np.float64]:
+    """(njnt, 2) lower and upper limits of a scene's joints [rad or m]; infinite without limits."""
+    limited = scene.jnt_limited[:, None].astype(bool)
+    return np.where(limited, scene.jnt_range, [-np.inf, np.inf])
 
 
 def _set_options(spec: mujoco.MjSpec, scenario: Scenario) -> None:
@@ -97,67 +120,105 @@ def _set_options(spec: mujoco.MjSpec, scenario: Scenario) -> None:
     option.tolerance = option.noslip_tolerance = _SOLVER_TOLERANCE
 
 
-def _robot_with_hands(scenario: Scenario) -> mujoco.MjSpec:
-    robot = _asset("robot.model", scenario.robot.model)
-    _check_posture(robot, scenario)
-    for hand in scenario.hands:
-        mount = robot.body(hand.mount)
-        if mount is None:
-            bodies = ", ".join(body.name for body in robot.bodies)
-            raise InvalidInputError(f"{hand.name}.mount", hand.mount, f"one of {bodies}")
-        model = _hand_model(hand)
-        mount.add_frame().attach_body(model.body("pad"), f"{hand.name}_", "")
-    for actuator in list(robot.actuators):
-        if actuator.target not in scenario.robot.posture:
-            robot.delete(actuator)
-    for joint in list(robot.joints):
-        if joint.name not in scenario.robot.posture:
-            robot.delete(joint)
-    base = scenario.robot.base
-    for root in robot.worldbody.bodies:
+def _robots(scenario: Scenario) -> mujoco.MjSpec:
+    """All robots; MuJoCo attaches under a prefix only, so those that have one join the other."""
+    spec = mujoco.MjSpec()
+    for robot in sorted(scenario.robots, key=lambda robot: robot.prefix != ""):
+        own = _robot(robot)
+        if robot.prefix:
+            spec.attach(own, prefix=robot.prefix, frame=spec.worldbody.add_frame())
+        else:
+            spec = own
+    return spec
+
+
+def _robot(robot: Robot) -> mujoco.MjSpec:
+    """One robot at its base, with motors at the driven joints and the others locked."""
+    spec = _read(f"{robot.label}.model", robot_spec, robot.model)
+    _check_joints(spec, robot)
+    for actuator in list(spec.actuators):
+        name = actuator.target
+        if name not in robot.posture:
+            spec.delete(actuator)
+            continue
+        low, high = actuator.ctrlrange
+        limit = robot.torque_limits.get(name, math.inf)
+        if low == high == 0.0:  # the model states none
+            low, high = -math.inf, math.inf
+        low, high = max(low, -limit), min(high, limit)
+        if not high > low > -math.inf:
+            field = f"{robot.label}.torque_limits.{name}"
+            raise InvalidInputError(field, "none, here or in the model", "a number > 0 [N m or N]")
+        actuator.ctrlrange = [low, high]
+    for joint in list(spec.joints):
+        if joint.name not in robot.posture:
+            spec.delete(joint)
+            continue
+        stated = [speed for speed in [*joint.userdata][:1] if speed > 0.0]
+        speeds = [*stated, *(s for n, s in robot.speed_limits.items() if n == joint.name)]
+        if not speeds:
+            field = f"{robot.label}.speed_limits.{joint.name}"
+            valid = "a number > 0 [rad/s or m/s]"
+            raise InvalidInputError(field, "none, here or in the model", valid)
+        joint.userdata = [min(speeds)]
+    base = robot.base
+    for root in spec.worldbody.bodies:
         position, quaternion = np.zeros(3), np.zeros(4)
         mujoco.mju_mulPose(
             position, quaternion, base.position, base.quaternion, root.pos, root.quat
         )
         root.pos, root.quat = position, quaternion
-    return robot
+    return spec
 
 
-def _asset(field: str, name: str) -> mujoco.MjSpec:
+def _read(field: str, read: Callable[[str], mujoco.MjSpec], model: str) -> mujoco.MjSpec:
     try:
-        path = asset_path(name)
-    except FileNotFoundError as missing:
-        raise InvalidInputError(field, repr(name), str(missing).partition("valid is ")[2]) from None
-    return mujoco.MjSpec.from_file(str(path))
+        return read(model)
+    except ModelError as error:
+        raise InvalidInputError(field, error.given, error.valid) from None
 
 
-def _check_posture(robot: mujoco.MjSpec, scenario: Scenario) -> None:
-    """Refuses start angles of joints that do not exist, or outside a joint's range."""
-    model = robot.copy().compile()
-    known = [model.joint(j).name for j in range(model.njnt)]
-    for name, angle in scenario.robot.posture.items():
-        if name not in known:
-            raise InvalidInputError("robot.posture", name, f"one of {', '.join(known)}")
+def _check_joints(spec: mujoco.MjSpec, robot: Robot) -> None:
+    """Refuses joints that do not exist, and start angles outside a joint's range."""
+    model = spec.copy().compile()
+    known = [name for j in range(model.njnt) if (name := model.joint(j).name)]
+    for field in ("posture", "torque_limits", "speed_limits"):
+        for name in getattr(robot, field):
+            if name not in known:
+                valid = f"one of {', '.join(known)}"
+                raise InvalidInputError(f"{robot.label}.{field}", name, valid)
+    for name, angle in robot.posture.items():
         low, high = model.joint(name).range
         if model.joint(name).limited[0] and not low <= angle <= high:
-            raise InvalidInputError(f"robot.posture.{name}", angle, f"in [{low:g}, {high:g}]")
+            valid = f"in [{low:g}, {high:g}]"
+            raise InvalidInputError(f"{robot.label}.posture.{name}", angle, valid)
 
 
-def _hand_model(hand: Hand) -> mujoco.MjSpec:
-    model = _asset(f"{hand.name}.model", hand.model)
+def _add_hand(spec: mujoco.MjSpec, hand: Hand) -> None:
+    mount = spec.body(hand.mount)
+    if mount is None:
+        bodies = ", ".join(body.name for body in spec.bodies)
+        raise InvalidInputError(f"{hand.name}.mount", hand.mount, f"one of {bodies}")
+    model = _read(f"{hand.name}.model", hand_spec, hand.model)
     for kind, part in (("body", "pad"), ("geom", "tip"), ("site", "tip_center")):
         if getattr(model, kind)(part) is None:
             raise InvalidInputError(f"{hand.name}.model", hand.model, f"one with a {kind} {part}")
-    return model
+    frame = mount.add_frame(pos=hand.mount_pose.position, quat=hand.mount_pose.quaternion)
+    frame.attach_body(model.body("pad"), f"{hand.name}_", "")
 
 
-def _add_geom(body: mujoco.MjsBody, geom: Geom) -> None:
+def _add_geom(spec: mujoco.MjSpec, body: mujoco.MjsBody, geom: Geom) -> None:
     if geom.kind not in _GEOM_TYPES:
         raise InvalidInputError(f"{geom.name}.kind", geom.kind, f"one of {', '.join(_GEOM_TYPES)}")
+    shape: dict[str, Any] = {"size": [*geom.size, 0.0, 0.0][:3]}
+    if geom.file is not None:
+        read = read_mesh(f"{geom.name}.file", geom.file, geom.size)
+        spec.add_mesh(name=geom.name, uservert=read.vertices.ravel(), userface=read.faces.ravel())
+        shape = {"meshname": geom.name}
     body.add_geom(
         name=geom.name,
         type=_GEOM_TYPES[geom.kind],
-        size=[*geom.size, 0.0, 0.0][:3],
+        **shape,
         pos=geom.pose.position,
         quat=geom.pose.quaternion,
         rgba=geom.rgba,
@@ -175,6 +236,7 @@ def _add_object(spec: mujoco.MjSpec, scenario: Scenario, motion: ObjectMotion) -
         quat=start.quaternion,
         mass=thing.mass,
         ipos=thing.center_of_mass,
+        iquat=thing.principal_axes,
         inertia=thing.inertia,
         explicitinertial=True,
         mocap=motion is ObjectMotion.POSED,
@@ -182,7 +244,7 @@ def _add_object(spec: mujoco.MjSpec, scenario: Scenario, motion: ObjectMotion) -
     if motion is ObjectMotion.FREE:
         body.add_freejoint(name=thing.name)
     for geom in thing.geoms:
-        _add_geom(body, geom)
+        _add_geom(spec, body, geom)
 
 
 def _add_pairs(spec: mujoco.MjSpec, scenario: Scenario) -> None:

@@ -14,6 +14,8 @@ from synthesis.uncertainty_set import UncertaintySet
 _LONGEST_S = 600.0
 # A run's steps are to be counted, and kept [s].
 _SHORTEST_STEP_S = 1e-5
+# Iterations of a solver per step that a run can wait for.
+_MOST_ITERATIONS = 10_000
 # No arm reaches farther, and the joint path takes a step every 5 mm [m].
 FARTHEST_M = 10.0
 
@@ -233,6 +235,23 @@ def controllers(control: Control) -> dict[str, Control]:
     }
 
 
+def controller(control: Control, name: str, field: str = "controller") -> Control:
+    """One of :func:`controllers`.
+
+    Raises:
+        InvalidInputError: There is none of that name; names the field that it was given in.
+    """
+    known = controllers(control)
+    if name not in known:
+        raise InvalidInputError(field, name, f"one of {', '.join(known)}")
+    return known[name]
+
+
+def default_controller(planned: bool) -> str:
+    """The controller that suits: only ``dynamic`` counts with the inertia of a planned tilt."""
+    return "dynamic" if planned else "robust"
+
+
 @dataclass(frozen=True)
 class Physics:
     """Settings of the contact solver; the defaults keep creep under 0.001 µm/s (see README).
@@ -260,6 +279,9 @@ class Physics:
             raise InvalidInputError("physics.timestep", self.timestep, valid)
         positive("physics.impratio", self.impratio)
         whole("physics.noslip_iterations", self.noslip_iterations, least=0)
+        if self.noslip_iterations > _MOST_ITERATIONS:
+            valid = f"at most {_MOST_ITERATIONS}"
+            raise InvalidInputError("physics.noslip_iterations", self.noslip_iterations, valid)
         length("physics.solimp", self.solimp, 3)
         for name in ("solref", "solref_friction"):
             length(f"physics.{name}", getattr(self, name), 2)

@@ -9,18 +9,19 @@ import pytest
 import trimesh
 
 from assets import asset_path, velocity_limits
-from scenarios import cylinder_tilt
-from scenarios.cylinder_tilt import INNER, OUTER, SCENARIO
+from scenarios import scenario
 from sim.ik import PathError, plan_joints
 from sim.poses import PathProblems
 from sim.recording.scenery import Scenery
 from sim.robot import RobotModel
-from sim.scenario import GRAVITY, Scenario
+from sim.scenario import GRAVITY, Pose, Scenario
 from sim.scene import compose, tip_geom, tip_site
 from sim.settings import Control, stretched
 from synthesis import InfeasibleError, Synthesizer
 from synthesis.contact import Array
 
+SCENARIO = scenario("cylinder-tilt")
+OUTER, INNER, LENGTH = 0.18, 0.15, 0.5  # [m]: Table I of the paper
 FINGERS = ["outer_finger", "inner_finger"]
 SLIDES = ["slide_x", "slide_y", "slide_z"]
 HINGES = ["wrist_pitch", "wrist_yaw", "wrist_roll"]
@@ -69,7 +70,7 @@ def test_the_stage_has_six_joints_and_each_finger_one_of_30_newtons(gripper):
         np.testing.assert_array_equal(limit, gripper.jnt_actfrcrange[gripper.joint(name).id])
         assert limit[1] == -limit[0]
         assert (limit[1] == 30.0) if name in FINGERS else limit[1] >= 30.0
-    assert cylinder_tilt.FINGER_LIMIT == 30.0
+    assert {hand.f_n_max for hand in SCENARIO.hands} == {30.0}
 
 
 def test_every_joint_has_a_range_and_a_speed_limit(gripper):
@@ -144,7 +145,7 @@ def test_pinocchio_and_mujoco_agree_on_slides_and_hinges(scene):
 
 def test_the_fingers_share_the_stage_but_not_each_other():
     robot = RobotModel(SCENARIO)
-    robot.update(np.array([SCENARIO.robot.posture[name] for name in robot.joints]))
+    robot.update(np.array([SCENARIO.posture[name] for name in robot.joints]))
     J_C = robot.contact_jacobians(np.zeros((2, 3)), np.array([np.eye(3)] * 2))
     np.testing.assert_array_equal(J_C[0, 3:, :6], J_C[1, 3:, :6])
     moves = np.abs(J_C).max(axis=1) > 1e-9
@@ -154,7 +155,7 @@ def test_the_fingers_share_the_stage_but_not_each_other():
 def annulus_inertia(inner: float) -> np.ndarray:
     """Principal moments by trimesh of the tube of the cylinder's mass, along the axis first."""
     # 2048 facets leave out 2e-6 of the cross-section.
-    tube = trimesh.creation.annulus(inner, OUTER, cylinder_tilt.LENGTH, sections=2048)
+    tube = trimesh.creation.annulus(inner, OUTER, LENGTH, sections=2048)
     tube.density = SCENARIO.object.mass / tube.volume
     across, _, along = np.diag(tube.moment_inertia)
     return np.array([along, across, across])
@@ -214,7 +215,7 @@ def test_the_full_cylinder_that_rolls_on_the_floor_is_neither_obstacle_nor_drawn
 def test_the_fingers_keep_still_while_the_stage_moves():
     # Still joints take the share 1e-8 / 1e-2 of the 0.8 m that the stage goes.
     assert np.ptp(tilting(to(SCENARIO, FAR))[:, 6:], axis=0).max() < 1e-5
-    restless = replace(SCENARIO, robot=replace(SCENARIO.robot, still=()))
+    restless = replace(SCENARIO, robots=(replace(SCENARIO.robots[0], still=()),))
     assert np.ptp(tilting(to(restless, 20.0))[:, 6:], axis=0).max() > 1e-2
 
 
@@ -222,9 +223,7 @@ def test_the_fingers_keep_still_while_the_stage_moves():
     ("change", "reason"),
     [
         (
-            lambda s: replace(
-                s, robot=replace(s.robot, base=replace(s.robot.base, position=(0.6, 0.0, 0.0)))
-            ),
+            lambda s: replace(s, robots=(replace(s.robots[0], base=Pose((0.6, 0.0, 0.0))),)),
             "slide_x at its lower limit -0.500 m",
         ),
         (
