@@ -1,6 +1,7 @@
 """Baxter tips a box against a wall that keeps its foot from sliding, until it leans there."""
 
 import math
+from dataclasses import replace
 
 from sim.scenario import (
     GRAVITY,
@@ -15,7 +16,7 @@ from sim.scenario import (
     Vector,
     View,
 )
-from sim.settings import LEAVE, REACH, TILT, Tolerances, stretched
+from sim.settings import LEAVE, REACH, TILT, Phase, Tolerances, stretched
 from sim.shape import homogeneous
 from sim.shapes import Box
 
@@ -29,16 +30,17 @@ PALM_LIMIT = 45.0  # [N]
 
 # Both palms press on the face before the robot, as low as they must be to hold the box back when
 # its weight is over the edge, from 29.7 deg on: by friction down the face.
-FACE_X = 0.665  # [m] in front of Baxter's torso frame
-UP, APART = 0.04, 0.206  # [m]: above the table, and from each other
+FACE_X, TABLE_Z = 0.67, -0.1  # [m] from Baxter's torso frame
+UP, APART = 0.033, 0.23  # [m]: above the table, and from each other
 # The wall leans back: in a corner of 90 deg an edge of 90 deg has no room to turn. At this tilt
 # the box lies on the wall and stays there.
 LEAN = math.radians(32.0)
+STANDOFF = 0.03  # [m] of the palms: forearms come near the chest
 # The table ends with the box, so that wrists have room before it.
 TABLE_LENGTH, TABLE_WIDTH, THICKNESS = 0.3, 0.34, 0.04  # [m]
 WALL_HEIGHT, WALL_BELOW = 0.4, 0.03  # [m]: along its slope, and how much of it is below the table
 
-_POSTURE = {"s0": 0.26, "s1": 0.88, "e0": -0.79, "e1": 1.95, "w0": -2.02, "w1": 1.36, "w2": -1.71}
+_POSTURE = {"s0": 0.09, "s1": 0.81, "e0": -0.72, "e1": 1.68, "w0": -2.05, "w1": 1.46, "w2": 1.12}
 _MIRRORED = ("s0", "e0", "w0", "w2")
 _EDGE_X = FACE_X + DEPTH
 _UP_WALL = (math.sin(LEAN), 0.0, math.cos(LEAN))
@@ -53,7 +55,7 @@ def _palm(name: str, side: float) -> Hand:
         geom="box",
         p_OC_O=(-DEPTH / 2, side * APART / 2, UP - HEIGHT / 2),
         normal_O=(1.0, 0.0, 0.0),
-        tangent_O=(0.0, 0.0, -1.0),
+        tangent_O=(0.0, 0.0, 1.0),
         friction=PALM_FRICTION,
         f_n_max=PALM_LIMIT,
     )
@@ -83,11 +85,17 @@ def _wall() -> Geom:
         "box",
         (THICKNESS / 2, TABLE_WIDTH / 2, WALL_HEIGHT / 2),
         Pose(
-            (*middle, up * _UP_WALL[2] - back * _OFF_WALL[2]),
+            (*middle, TABLE_Z + up * _UP_WALL[2] - back * _OFF_WALL[2]),
             (math.cos(LEAN / 2), 0.0, math.sin(LEAN / 2), 0.0),
         ),
         rgba=(0.62, 0.66, 0.72, 1.0),
     )
+
+
+def _phases() -> tuple[Phase, ...]:
+    """Hands withdraw no farther than forearms may come back to the chest."""
+    phases = stretched((*REACH, *TILT, *LEAVE), 5.0)
+    return tuple(replace(p, gap=STANDOFF) if p.gap > STANDOFF else p for p in phases)
 
 
 SCENARIO = Scenario(
@@ -99,7 +107,7 @@ SCENARIO = Scenario(
             "table",
             "box",
             (TABLE_LENGTH / 2, TABLE_WIDTH / 2, THICKNESS / 2),
-            Pose((FACE_X + TABLE_LENGTH / 2, 0.0, -THICKNESS / 2)),
+            Pose((FACE_X + TABLE_LENGTH / 2, 0.0, TABLE_Z - THICKNESS / 2)),
             rgba=(0.75, 0.77, 0.80, 1.0),
         ),
         _wall(),
@@ -122,12 +130,13 @@ SCENARIO = Scenario(
         ),
     ),
     path=Pivot(
-        start=Pose((FACE_X + DEPTH / 2, 0.0, HEIGHT / 2)),
-        point_W=(_EDGE_X, 0.0, 0.0),
+        start=Pose((FACE_X + DEPTH / 2, 0.0, TABLE_Z + HEIGHT / 2)),
+        point_W=(_EDGE_X, 0.0, TABLE_Z),
         axis_W=(0.0, 1.0, 0.0),
         angle_deg=math.degrees(LEAN),
     ),
-    phases=stretched((*REACH, *TILT, *LEAVE), 5.0),
+    phases=_phases(),
+    standoff=STANDOFF,
     # Table and wall hold the same edge. How they share its load is not for statics to say: what
     # one takes more the other takes less, up to its friction, while the edge stays where it is.
     tolerances=Tolerances(utilisation=1.01, force_error=0.5),
