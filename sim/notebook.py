@@ -62,8 +62,8 @@ def scenario_markdown(scenario: Scenario) -> str:
         f", centre of mass at ({_numbers(thing.center_of_mass)}) m. Tilt by "
         f"{number(path.angle_deg)} deg.",
         table(
-            ("robot", "stands at [m]", "driven joints"),
-            [(r.prefix + r.model, _numbers(r.base.position), len(r.posture)) for r in robots],
+            ("robot", "prefix of its names", "stands at [m]", "driven joints"),
+            [(r.model, r.prefix, _numbers(r.base.position), len(r.posture)) for r in robots],
         ),
         table(
             ("contact", "what", "μ", "e_n [m]", "f_n at most [N]", "place on the object [m]"),

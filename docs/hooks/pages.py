@@ -13,11 +13,18 @@ from typing import Any, get_args
 
 from mkdocs.exceptions import PluginError
 from mkdocs.structure.files import File, Files
+from schema import reference
 
 from scenarios import scenarios
 from scenarios.cli import Command, main
+from scenarios.file import schema
 
 _ROOT = Path(__file__).parent.parent.parent
+_FILES = """# Scenario files
+
+All keys of a [scenario file](scenario.md), table by table, from the schema that editors read and
+that `fulcrum check` checks by.
+"""
 _COLUMNS = "90"
 _NO_PICTURE = (
     "No picture here: MuJoCo found no EGL to draw with when this page was made "
@@ -34,6 +41,7 @@ def on_files(files: Files, config: Any) -> Files:
     for shown in sorted((_ROOT / "assets").glob("*.png")):
         add(f"assets/{shown.name}", shown.read_bytes())
     add("commands.md", commands())
+    add("file.md", f"{_FILES}\n{reference(schema())}")
     drawn = pictures()
     parts = [(_ROOT / "docs" / "scenes.md").read_text()]
     for name, scene in scenarios().items():

@@ -10,11 +10,11 @@ import mujoco
 import numpy as np
 from PIL import Image
 
-from assets import ROBOTS, description_path
+from assets.models import looks_of
 from assets.visuals import Visual, link_names, load_visuals
 from scenarios import scenarios
 from sim.ik import JointPath, plan_joints
-from sim.path import ScrewPath
+from sim.path import ObjectPath, object_path
 from sim.robot import RobotModel
 from sim.scenario import Scenario
 from sim.scene import ObjectMotion, compose
@@ -27,7 +27,7 @@ def draw(scenario: Scenario) -> Image.Image:
     """A scene at the start, half-way and at the end of its tilt, side by side."""
     model = _dressed(scenario).compile()
     data = mujoco.MjData(model)
-    path, joints = ScrewPath(scenario.path), RobotModel(scenario).joints
+    path, joints = object_path(scenario.path), RobotModel(scenario).joints
     arms = plan_joints(scenario)
     views = []
     with mujoco.Renderer(model, _HEIGHT, _WIDTH) as renderer:
@@ -42,7 +42,7 @@ def _pose(
     scenario: Scenario,
     model: mujoco.MjModel,
     data: mujoco.MjData,
-    path: ScrewPath,
+    path: ObjectPath,
     share: float,
     joints: tuple[str, ...],
     arms: JointPath,
@@ -74,16 +74,16 @@ def _dressed(scenario: Scenario) -> mujoco.MjSpec:
     spec = compose(scenario, ObjectMotion.POSED)
     _light(spec)
     for robot in scenario.robots:
-        description = ROBOTS.get(robot.model)
+        description = looks_of(robot.model)
         if description is None:
             continue
-        urdf = description_path(description).read_text()
+        urdf = description.read_text()
         bodies = {body.name for body in spec.bodies}
         links = {link for link in link_names(urdf) if robot.prefix + link in bodies}
         for link in links:
             for geom in spec.body(robot.prefix + link).geoms:
                 geom.rgba = [0.0, 0.0, 0.0, 0.0]
-        for number, visual in enumerate(load_visuals(urdf, links)):
+        for number, visual in enumerate(load_visuals(urdf, description, links)):
             owned = replace(visual, link=robot.prefix + visual.link)
             _add_visual(spec, owned, f"{robot.prefix}visual_{number}")
     return spec
