@@ -1,8 +1,8 @@
 """Two UR5 arms pivot a 60 N box about its edge: that of `panda_box.py`, and the same places."""
 
-from scenarios.panda_box import BOX, CONTROL, PATH, TABLE, edge, hand
+from scenarios.panda_box import BOX, CONTROL, PATH, PHASES, TABLE, TOLERANCES, edge, hand
 from sim.scenario import Geom, Pose, Robot, Scenario, View
-from sim.settings import LEAVE, REACH, TILT, Physics
+from sim.settings import Physics
 
 # Found by search over place and posture: at least 1.4 rad from every joint limit. The arm has no
 # mirror plane, so that each side has its own.
@@ -48,8 +48,9 @@ SCENARIO = Scenario(
     supports=(edge("edge_left", 1.0), edge("edge_right", -1.0)),
     robots=(_arm("left", 1.0), _arm("right", -1.0)),
     path=PATH,
-    phases=(*REACH, *TILT, *LEAVE),
+    phases=PHASES,
     control=CONTROL,
     physics=PHYSICS,
+    tolerances=TOLERANCES,
     view=View(eye=(1.5, -1.2, 0.9), target=(0.0, 0.0, 0.15)),
 )

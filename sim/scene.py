@@ -52,7 +52,9 @@ def compose(scenario: Scenario, motion: ObjectMotion = ObjectMotion.FREE) -> muj
     _add_object(spec, scenario, motion)
     if motion is ObjectMotion.FREE:
         _add_pairs(spec, scenario)
-        for first, second in unwanted_pairs(scenario, _compiled(spec)):
+    scene = _compiled(spec)
+    if motion is ObjectMotion.FREE:
+        for first, second in unwanted_pairs(scenario, scene):
             spec.add_pair(geomname1=first, geomname2=second)
     _add_view(spec, scenario)
     return spec
@@ -124,6 +126,7 @@ def _robots(scenario: Scenario) -> mujoco.MjSpec:
     for robot in sorted(scenario.robots, key=lambda robot: robot.prefix != ""):
         own = _robot(robot)
         if robot.prefix:
+            own.default.name = "robot"  # the main defaults of hands are called "main", too
             spec.attach(own, prefix=robot.prefix, frame=spec.worldbody.add_frame())
         else:
             spec = own
