@@ -155,7 +155,7 @@ def _robot(robot: Robot) -> mujoco.MjSpec:
         if joint.name not in robot.posture:
             spec.delete(joint)
             continue
-        stated = [speed for speed in [*joint.userdata][:1] if speed > 0.0]
+        stated = [speed for speed in [*joint.userdata][:1] if 0.0 < speed < math.inf]
         speeds = [*stated, *(s for n, s in robot.speed_limits.items() if n == joint.name)]
         if not speeds:
             field = f"{robot.label}.speed_limits.{joint.name}"
