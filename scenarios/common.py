@@ -3,12 +3,16 @@
 from __future__ import annotations
 
 import contextlib
+import itertools
+import math
 from collections.abc import Iterator
-from dataclasses import replace
+from dataclasses import dataclass, field, replace
 from datetime import datetime
 from enum import StrEnum
 from pathlib import Path
 from typing import TYPE_CHECKING, Protocol, TypeVar
+
+import tyro
 
 if TYPE_CHECKING:
     from sim.execution import Planning
@@ -20,20 +24,59 @@ Kind = TypeVar("Kind", bound=StrEnum)
 PASSED, FAILED, BAD_INPUT, INTERRUPTED = 0, 1, 2, 130
 
 
+@dataclass(frozen=True)
+class Chosen:
+    """What every command on a scenario is told."""
+
+    scenario: tyro.conf.Positional[str]
+    """Name of a scenario (see `fulcrum list`), or a file ending in .toml (see `fulcrum new`)."""
+
+    allow_path: tyro.conf.UseAppendAction[tuple[Path, ...]] = field(default=(), kw_only=True)
+    """Folder besides its own from which the file may have meshes and robots read."""
+
+    def chosen(self) -> Scenario:
+        """The scenario.
+
+        Raises:
+            InvalidInputError: There is none of that name, or the file is not valid.
+        """
+        from scenarios import scenario
+
+        return scenario(self.scenario, self.allow_path)
+
+    def told(self, error: Exception) -> str:
+        """An error as a sentence, with the scenario's file, if it has one, and what may help."""
+        from scenarios.file import SUFFIX, open_source
+        from scenarios.file_errors import FileError
+        from sim.ik import PathError
+
+        if not self.scenario.endswith(SUFFIX) or isinstance(error, FileError):
+            return str(error)
+        if not isinstance(error, PathError):
+            return f"{self.scenario}: {error}"
+        line = open_source(Path(self.scenario)).line(("path",))
+        return (
+            f"{self.scenario}:{line}: path: {str(error).rstrip('.')}; "
+            f"`fulcrum place {self.scenario}` seeks places for object, robots and hands that can."
+        )
+
+    @property
+    def words(self) -> list[str]:
+        """How a command line names it."""
+        allowed = [("--allow-path", str(folder)) for folder in self.allow_path]
+        return [self.scenario, *itertools.chain.from_iterable(allowed)]
+
+
 def chosen_control(scenario: Scenario, controller: str, objective: str | None) -> Control:
     """The scenario's control of a name, with another objective if one is given.
 
     Raises:
         InvalidInputError: There is no such controller or objective.
     """
-    from sim.settings import controllers
-    from synthesis.errors import InvalidInputError
+    from sim.settings import controller as named
     from synthesis.problem import Objective
 
-    known = controllers(scenario.control)
-    if controller not in known:
-        raise InvalidInputError("--controller", controller, f"one of {', '.join(known)}")
-    control = known[controller]
+    control = named(scenario.control, controller, "--controller")
     if objective is None:
         return control
     return replace(control, objective=one_of(Objective, "--objective", objective))
@@ -52,22 +95,47 @@ def one_of(kind: type[Kind], option: str, text: str) -> Kind:
     return kind(text)
 
 
-def chosen_planning(plan: str | None, stretch: float) -> Planning | None:
+def chosen_planning(
+    scenario: Scenario, plan: str | None, stretch: float, duration: float | None, robust: bool
+) -> Planning | None:
     """How the tilt is planned; None if it is not.
 
     Raises:
-        InvalidInputError: There is no such plan, or none to be stretched.
+        InvalidInputError: There is no such plan, or none to be stretched or made robust.
     """
-    from sim.execution import LEAST_TIME, Planning
     from synthesis.errors import InvalidInputError
 
-    if plan is None:
-        if stretch != 1.0:
-            raise InvalidInputError("--stretch", stretch, f"given with --plan {LEAST_TIME}")
-        return None
-    if plan != LEAST_TIME:
-        raise InvalidInputError("--plan", plan, LEAST_TIME)
-    return Planning(stretch)
+    if plan is not None:
+        return asked_planning(scenario, "--plan", plan, stretch, duration, robust)
+    for option, given, default in (("--stretch", stretch, 1.0), ("--robust", robust, False)):
+        if given != default:
+            raise InvalidInputError(option, given, "given with --plan")
+    return None
+
+
+def asked_planning(
+    scenario: Scenario,
+    option: str,
+    objective: str,
+    stretch: float,
+    duration: float | None,
+    robust: bool,
+    points: int = 100,
+) -> Planning:
+    """A plan as it is asked for; with the scenario's own duration if the objective needs one.
+
+    Raises:
+        InvalidInputError: There is no such plan.
+    """
+    from sim.execution import Planning
+    from sim.settings import tilting
+    from synthesis.path_problem import PathObjective
+
+    kind = one_of(PathObjective, option, objective)
+    if duration is None:
+        own = sum(scenario.phases[i].duration_s for i in tilting(scenario.phases))
+        duration = own if kind.needs_duration else math.inf
+    return Planning(stretch, points, kind, duration, robust)
 
 
 class Move(Protocol):

@@ -10,12 +10,11 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-import tyro
-
 from scenarios.common import (
     FAILED,
     INTERRUPTED,
     PASSED,
+    Chosen,
     chosen_planning,
     dated_folder,
     progress_bar,
@@ -33,11 +32,8 @@ _NAMED = 4
 
 
 @dataclass(frozen=True)
-class Sweep:
+class Sweep(Chosen):
     """Run a scenario in many worlds: success rates, causes of failure, success map, replays."""
-
-    scenario: tyro.conf.Positional[str]
-    """Name of the scenario (see `fulcrum list`)."""
 
     episodes: int
     """How many worlds; with a grid, at each of its points."""
@@ -50,10 +46,17 @@ class Sweep:
     a plan those that count with inertia, else those that do not."""
 
     plan: str | None = None
-    """least-time: plan the tilt, and execute that in every world."""
+    """least-time, least-effort or friction-margin: plan the tilt, and execute that in every
+    world."""
 
     stretch: float = 1.0
     """By how much the planned duration is stretched."""
+
+    robust: bool = False
+    """The plan also serves the uncertainty set of controller robust, or as much as it can."""
+
+    duration: float | None = None
+    """The longest that a plan may take [s]; the scenario's own if left out."""
 
     grid: str = ""
     """What to set of every world drawn, like friction=0.7:1.3:7,weight=0.8,1.0,1.2 (factors)."""
@@ -81,7 +84,6 @@ class Sweep:
         from sim.sweep.farm import Workers, run_sweep
         from sim.sweep.picture import draw_map
         from sim.sweep.store import MAP, SUMMARY, Store
-        from sim.sweep.summary import scores
 
         workers = Workers(self.workers, self.scheduler)
         try:
@@ -90,14 +92,14 @@ class Sweep:
             print(error)
             return FAILED
         pair = self._map(sweep)
-        folder = self.out or dated_folder(f"sweep-{self.scenario}-{self.preset}")
+        folder = self.out or dated_folder(f"sweep-{sweep.scenario.name}-{self.preset}")
         store = Store(sweep, folder)
         before, started = len(store.missing()), time.perf_counter()
         try:
-            with progress_bar(self.scenario) as move:
-                rows = run_sweep(
+            with progress_bar(sweep.scenario.name) as move:
+                outcome = run_sweep(
                     sweep,
-                    store,
+                    folder,
                     workers,
                     lambda done, total, failures: move(
                         done, total, f"{done} of {total}, {failures} failed"
@@ -113,11 +115,10 @@ class Sweep:
             )
             return INTERRUPTED
         minutes = (time.perf_counter() - started) / 60.0
-        hands = tuple(hand.name for hand in sweep.scenario.hands)
-        found = scores(rows, hands)
-        draw_map(rows, sweep, pair, store.folder / MAP)
+        found = outcome.scores
+        draw_map(outcome.rows, sweep, pair, store.folder / MAP)
         summary = {
-            "scenario": self.scenario,
+            "scenario": sweep.scenario.name,
             "preset": self.preset,
             "episodes": self.episodes,
             "seed": self.seed,
@@ -141,13 +142,14 @@ class Sweep:
         return PASSED
 
     def _sweep(self) -> Design:
-        from scenarios import scenario
         from sim.execution import planned_tilt
         from sim.settings import controllers
         from sim.sweep.design import Sweep as Design
         from sim.sweep.parameters import parse_grid
 
-        chosen, planning = scenario(self.scenario), chosen_planning(self.plan, self.stretch)
+        chosen = self.chosen()
+        asked = self.plan, self.stretch, self.duration, self.robust
+        planning = chosen_planning(chosen, *asked)
         if planning is not None:
             chosen = planned_tilt(chosen, planning).scenario
         if self.controllers is None:
@@ -164,6 +166,7 @@ class Sweep:
             seed=self.seed,
             grid=parse_grid("--grid", self.grid),
             planning=planning,
+            called=shlex.join(self.words),
         )
 
     def _map(self, sweep: Design) -> tuple[str, str]:
@@ -181,11 +184,11 @@ class Sweep:
 
     def _again(self, folder: Path) -> str:
         """The command that goes on with this sweep."""
-        words = ["fulcrum", "sweep", self.scenario]
+        words = ["fulcrum", "sweep", *self.words]
         for field in dataclasses.fields(self):
             value = folder if field.name == "out" else getattr(self, field.name)
-            if field.name != "scenario" and value not in (None, ""):
-                words += [f"--{field.name}", str(value)]
+            if field.name not in ("scenario", "allow_path") and value not in (None, "", False):
+                words += [f"--{field.name}"] if value is True else [f"--{field.name}", str(value)]
         return shlex.join(words)
 
 

@@ -15,6 +15,7 @@ from assets.mjcf import LOOKS
 from assets.models import hand_spec, robot_spec
 from assets.packages import ModelError
 from sim.meshes import check_contacts, read_mesh
+from sim.path import check_supports
 from sim.scenario import GRAVITY, Friction, Geom, Hand, Robot, Scenario
 from synthesis import InvalidInputError
 
@@ -42,6 +43,7 @@ def compose(scenario: Scenario, motion: ObjectMotion = ObjectMotion.FREE) -> muj
             not exist, or a start angle outside its joint's range, or MuJoCo refuses the scene.
     """
     check_contacts(scenario)
+    check_supports(scenario)
     spec = _robots(scenario)
     for hand in scenario.hands:
         _add_hand(spec, hand)

@@ -11,7 +11,7 @@ from scipy.spatial.transform import Rotation
 from assets import asset_path
 from assets.models import robot_spec
 from scenarios import scenario, scenarios
-from scenarios.scenes import scene_xml
+from scenarios.scene_files import scene_xml
 from sim.scenario import Friction, Geom, Pose
 from sim.scene import ObjectMotion, compose, hand_body, tip_geom, tip_site
 
