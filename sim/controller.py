@@ -16,7 +16,7 @@ from sim.health import Health, Sent
 from sim.ik import JointPath
 from sim.inertia import inertial_wrenches
 from sim.observer import PoseObserver
-from sim.path import ScrewPath
+from sim.path import object_path
 from sim.plant import Measurement
 from sim.references import References, Target
 from sim.replanning import Replanner
@@ -95,7 +95,7 @@ class Controller:
         """
         self._replanner, self._timestep = replanner, scenario.physics.timestep
         self._control, schedule = control, joint_path.schedule
-        self._scenario, self._robot, self._path = scenario, robot, ScrewPath(scenario.path)
+        self._scenario, self._robot, self._path = scenario, robot, object_path(scenario.path)
         self._references = References(joint_path, self._timestep)
         self._free, self._held = schedule.free, schedule.held
         # Once the grip has been let go for good there is nothing left to be lowered.

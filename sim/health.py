@@ -9,7 +9,7 @@ import mujoco
 import numpy as np
 
 from sim.guard import Cause, Finding
-from sim.path import ScrewPath
+from sim.path import object_path
 from sim.plant import Measurement
 from sim.references import Target
 from sim.robot import RobotModel
@@ -55,7 +55,7 @@ class Health:
         """Takes over thresholds, the belief, and the joints' start [rad or m], (l,)."""
         self._settings, self._robot = settings, robot
         self._hands = tuple(hand.name for hand in scenario.hands)
-        self._path = ScrewPath(scenario.path)
+        self._path = object_path(scenario.path)
         inward = np.array([hand.normal_O for hand in scenario.hands]).reshape(-1, 3)
         places = np.array([hand.p_OC_O for hand in scenario.hands]).reshape(-1, 3)
         self._p_OT_O = places - robot.tip_radii[:, None] * inward

@@ -14,7 +14,7 @@ from scipy.spatial.transform import Rotation
 
 from assets import velocity_limits
 from sim.contacts import ContactFrames
-from sim.path import ScrewPath
+from sim.path import object_path
 from sim.scenario import Scenario
 from sim.scene import ObjectMotion, compose, tip_geom, tip_site, unwanted_pairs
 from sim.schedule import Schedule
@@ -123,7 +123,7 @@ class _Target(NamedTuple):
 
 class _Follower:
     def __init__(self, scenario: Scenario, solved: float) -> None:
-        self._scenario, self._path = scenario, ScrewPath(scenario.path)
+        self._scenario, self._path = scenario, object_path(scenario.path)
         self._solved = solved
         self._schedule = Schedule(scenario)
         self._frames = ContactFrames(scenario)

@@ -13,7 +13,7 @@ from scipy.spatial.transform import Rotation
 from sim.checks import not_negative, positive
 from sim.ik import JointPath, plan_joints
 from sim.inertia import inertial_wrenches
-from sim.path import ScrewPath
+from sim.path import ObjectPath, object_path
 from sim.robot import RobotModel
 from sim.scenario import Scenario
 from sim.settings import Control
@@ -91,7 +91,7 @@ def path_problem(
     Raises:
         PathError: The arms cannot follow the path.
     """
-    robot, path = RobotModel(scenario), ScrewPath(scenario.path)
+    robot, path = RobotModel(scenario), object_path(scenario.path)
     control = Control(friction_factor=margins.friction_factor, preload=margins.grip_min)
     nominal = UncertaintySet(friction=uncertainty.friction)
     sets = [(scenario, nominal)]
@@ -187,7 +187,7 @@ def _within(problem: Problem, share: float) -> Problem:
 
 
 def _tips(
-    scenario: Scenario, margins: Margins, path: ScrewPath, s: Array
+    scenario: Scenario, margins: Margins, path: ObjectPath, s: Array
 ) -> tuple[Rates, Accelerations]:
     """Speeds and accelerations of the hands' contacts, which go with the object."""
     places = [np.asarray(hand.p_OC_O) for hand in scenario.hands]

@@ -12,6 +12,7 @@ import numpy as np
 
 from assets import hand_path, robot_path
 from sim.meshes import check_contacts, read_mesh
+from sim.path import check_supports
 from sim.scenario import GRAVITY, Friction, Geom, Hand, Robot, Scenario
 from synthesis import InvalidInputError
 
@@ -39,6 +40,7 @@ def compose(scenario: Scenario, motion: ObjectMotion = ObjectMotion.FREE) -> muj
             not exist, or a start angle outside its joint's range, or MuJoCo refuses the scene.
     """
     check_contacts(scenario)
+    check_supports(scenario)
     spec = _robots(scenario)
     for hand in scenario.hands:
         _add_hand(spec, hand)

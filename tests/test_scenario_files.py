@@ -226,3 +226,23 @@ def test_a_post_is_a_cylinder_below_its_top(folder):
             ("[environment.table]", post),
             ("[supports.edge_left]", support.replace("[0, 0, -0.05]", "[0.1, 0, -0.05]")),
         )
+
+
+def test_poses_are_passed_from_the_start_on(folder):
+    # The corner at the origin of the turns is the box's edge.
+    turned = (
+        '[path]\nkind = "poses"\n\n[[path.poses]]\nposition_m = [0.45, 0.0, 0.15]\n'
+        "rpy_deg = [0, -90, 0]\n\n[manoeuvre]"
+    )
+    old = '[path]\nedge = ["-x +y -z", "-x -y -z"]\nangle_deg = 90.0\n\n[manoeuvre]'
+    path = said(folder, (old, turned)).path
+    assert path.angle_deg == pytest.approx(90.0)
+    assert path.point_W == pytest.approx((0.5, 0.0, 0.0), abs=1e-9)
+    scenario("said.toml")
+    # Poses that lift the edge are refused, as are those that do not turn.
+    lifting = turned.replace("[0.45, 0.0, 0.15]", "[0.45, 0.0, 0.25]")
+    for new, answer in ((lifting, "edge_left"), (turned.replace("-90", "0"), "a turn of")):
+        with pytest.raises(FileError, match=answer) as refused:
+            said(folder, (old, new))
+            scenario("said.toml")
+        assert refused.value.line is not None
