@@ -16,7 +16,15 @@ from assets import velocity_limits
 from sim.contacts import ContactFrames
 from sim.path import object_path
 from sim.scenario import Scenario
-from sim.scene import ObjectMotion, compose, tip_geom, tip_site, unwanted_pairs
+from sim.scene import (
+    ObjectMotion,
+    compose,
+    is_solid,
+    joint_ranges,
+    tip_geom,
+    tip_site,
+    unwanted_pairs,
+)
 from sim.schedule import Schedule
 from synthesis import FulcrumError, InvalidInputError
 from synthesis.contact import Array
@@ -165,7 +173,7 @@ class _Follower:
         self._configuration.update(holding)
         planned += [self._follow(i) for i in range(touched + 1, len(phases))]
         progress, q = zip(*planned, strict=True)
-        low, high = self._model.jnt_range[self._motor_joints].T
+        low, high = joint_ranges(self._model)[self._motor_joints].T
         every = np.concatenate(q)
         clearance = np.minimum(every - low, high - every).min(axis=0)
         return JointPath(self._schedule, tuple(progress), tuple(q), clearance)
@@ -249,7 +257,7 @@ class _Follower:
         model, q = self._model, self._configuration.q
         reasons = []
         for j in range(model.njnt):
-            name, (low, high) = model.joint(j).name, model.jnt_range[j]
+            name, (low, high) = model.joint(j).name, joint_ranges(model)[j]
             unit = "m" if model.jnt_type[j] == mujoco.mjtJoint.mjJNT_SLIDE else "rad"
             if too_fast[j]:
                 reasons.append(f"{name} at its speed limit {self._qd_max[j]:g} {unit}/s")
@@ -287,7 +295,7 @@ class _Follower:
         """
         model, scenario = self._model, self._scenario
         surroundings = [g.name for g in (*scenario.object.geoms, *scenario.environment)]
-        names = [model.geom(g).name for g in range(model.ngeom)]
+        names = [g.name for g in map(model.geom, range(model.ngeom)) if is_solid(g)]
         links = [name for name in names if name not in surroundings]
         moving = [name for name in links if model.body_weldid[model.geom(name).bodyid[0]] != 0]
         pairs = [([link], [other]) for link, other in unwanted_pairs(scenario, model)]
