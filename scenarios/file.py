@@ -52,6 +52,15 @@ def made(source: Source, allowed: tuple[Path, ...] = ()) -> Scenario:
     return build(source, _validated(source, ScenarioFile), Places(source, allowed))
 
 
+def read_tables(file: Path) -> ScenarioFile:
+    """What a scenario file says, table by table: also what is no part of the scenario itself.
+
+    Raises:
+        FileError: It is not valid, or says no more than what it is lifted from.
+    """
+    return _validated(open_source(file), ScenarioFile)
+
+
 def open_source(file: Path) -> Source:
     """The text of a file.
 
