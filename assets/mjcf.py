@@ -83,7 +83,7 @@ def _motors(model: mujoco.MjModel, joints: list[str]) -> dict[str, tuple[float, 
     """Least and largest torque or force of each joint, first of those with an actuator."""
     ranges = {}
     for i in range(model.nu):
-        if model.actuator_trntype[i] in (_JOINT, mujoco.mjtTrn.mjTRN_JOINTINPARENT):
+        if _drives_a_joint(model, i):
             ranges[model.joint(model.actuator_trnid[i, 0]).name] = (-np.inf, np.inf)
     ranges |= {name: (-np.inf, np.inf) for name in joints if name not in ranges}
     for name, (low, high) in _limits(model):
@@ -98,7 +98,7 @@ def _limits(model: mujoco.MjModel) -> Iterator[tuple[str, tuple[float, float]]]:
         if model.jnt_actfrclimited[j]:
             yield model.joint(j).name, tuple(model.jnt_actfrcrange[j].tolist())
     for i in range(model.nu):
-        if model.actuator_trntype[i] not in (_JOINT, mujoco.mjtTrn.mjTRN_JOINTINPARENT):
+        if not _drives_a_joint(model, i):
             continue
         name, gear = model.joint(model.actuator_trnid[i, 0]).name, model.actuator_gear[i, 0]
         is_motor = (
@@ -111,6 +111,11 @@ def _limits(model: mujoco.MjModel) -> Iterator[tuple[str, tuple[float, float]]]:
         if is_motor and model.actuator_ctrllimited[i]:
             gain = model.actuator_gainprm[i, 0]
             yield name, _in_order(gear * gain * model.actuator_ctrlrange[i])
+
+
+def _drives_a_joint(model: mujoco.MjModel, actuator: int) -> bool:
+    kind = mujoco.mjtTrn(model.actuator_trntype[actuator])
+    return kind in (_JOINT, mujoco.mjtTrn.mjTRN_JOINTINPARENT)
 
 
 def _in_order(limits: np.ndarray) -> tuple[float, float]:

@@ -54,9 +54,10 @@ class Scenery:
         urdf = description.read_text()
         names = {self._model.body(b).name for b in range(self._model.nbody)}
         links = {link for link in link_names(urdf) if robot.prefix + link in names}
-        self._dressed |= {robot.prefix + link for link in links}
         visuals = load_visuals(urdf, description, links)
         self._visuals += [replace(v, link=robot.prefix + v.link) for v in visuals]
+        if visuals:
+            self._dressed |= {robot.prefix + link for link in links}
 
     def _primitives(self) -> Iterator[int]:
         """Visible geoms; a robot's own collision primitives only where it has no meshes."""
