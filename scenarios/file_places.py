@@ -10,6 +10,7 @@ from typing import Protocol
 import numpy as np
 from scipy.spatial.transform import Rotation
 
+from assets.packages import package_root
 from scenarios.file_errors import Key, Source, nearest
 from sim.scenario import Geom, Pose, Quaternion, Vector
 from sim.shape import Shape
@@ -182,11 +183,16 @@ class Places:
         """A model that ships, by its name, or the path of the file that a key names.
 
         Raises:
-            FileError: There is neither.
+            FileError: There is neither, or its package reaches beyond the folders allowed.
         """
         if given in shipped:
             return given
         if "." not in given and "/" not in given:
             valid = f"{nearest(given, list(shipped))}; or {what}"
             raise self._source.error(key, f'"{given}"', valid)
-        return str(self.file(key, given, what))
+        file = self.file(key, given, what)
+        root = package_root(file)
+        if not any(root.is_relative_to(folder) for folder in self._allowed):
+            valid = f"{what} whose package {root} is given with --allow-path, as it may read there"
+            raise self._source.error(key, given, valid)
+        return str(file)

@@ -208,6 +208,17 @@ def test_a_mesh_beside_the_file_is_read_and_one_elsewhere_where_it_is_allowed(fo
     assert (code, "tilt: got 100" in errors) == (2, True)
 
 
+def test_a_robot_whose_package_reaches_out_of_the_folder_is_refused(folder):
+    (folder.parent / "package.xml").write_text("<package><name>mine</name></package>")
+    (folder / "arm.urdf").write_text("<robot/>")
+    own = ('model = "baxter"', 'model = "arm.urdf"')
+    with pytest.raises(FileError, match="given with --allow-path"):
+        said(folder, own)
+    assert read(folder / "said.toml", (folder.parent,)).robots[0].model.endswith("arm.urdf")
+    (folder / "package.xml").write_text("<package><name>arm</name></package>")
+    assert said(folder, own).robots[0].model.endswith("arm.urdf")
+
+
 def test_a_post_is_a_cylinder_below_its_top(folder):
     post = (
         '[environment.post]\nkind = "post"\nsize_m = [0.1, 0.6]\nposition_m = [0.65, 0, 0]\n'
