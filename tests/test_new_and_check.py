@@ -143,6 +143,7 @@ def test_commands_take_a_file_and_its_replay_names_it(folder, capsys):
     assert ended("explain good.toml --json why.json", capsys)[0] == 0
     assert json.loads((folder / "why.json").read_text())["scenario"] == "good"
     assert ended("plan good.toml --points 20 --out plan", capsys)[0] == 0
+    assert ended("run good.toml --seed -1", capsys)[2].startswith("fulcrum: --seed: ")
     design = SweepCommand("good.toml", 1)._sweep()
     replay = design.replay(design.all_episodes()[0])
     assert replay.startswith("fulcrum run good.toml --controller")
