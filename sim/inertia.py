@@ -7,7 +7,6 @@ tilt: :math:`f = m\,\ddot c`, :math:`m_c = I \dot\omega + \omega \times I \omega
 from __future__ import annotations
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 from sim.path import ObjectPath
 from sim.scenario import Scenario
@@ -23,14 +22,13 @@ def inertial_wrenches(scenario: Scenario, path: ObjectPath, tilt: float) -> tupl
         tilt: :math:`\theta` [rad].
     """
     thing = scenario.object
-    center, moments = np.asarray(thing.center_of_mass), np.asarray(thing.inertia)
-    R_OI = Rotation.from_quat(thing.principal_axes, scalar_first=True).as_matrix()
+    center, inertia = np.asarray(thing.center_of_mass), thing.inertia_O
     R_WO, _ = path.pose(tilt)
     slope, curvature = path.derivatives(tilt, center)
     omega, alpha = R_WO.T @ path.axis(tilt), R_WO.T @ path.axis_slope(tilt)
     f_a, f_b = thing.mass * R_WO.T @ slope, thing.mass * R_WO.T @ curvature
-    m_a = R_OI @ (moments * (omega @ R_OI))
-    m_b = R_OI @ (moments * (alpha @ R_OI)) + np.cross(omega, m_a)
+    m_a = inertia @ omega
+    m_b = inertia @ alpha + np.cross(omega, m_a)
     return (
         np.concatenate([f_a, m_a + np.cross(center, f_a)]),
         np.concatenate([f_b, m_b + np.cross(center, f_b)]),

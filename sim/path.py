@@ -25,6 +25,8 @@ _REFINEMENTS = 4
 # Two places on the path whose orientations differ by less than this share of the tilt between them
 # cannot be told apart well.
 _APART = 0.5
+_NO_SLOPE = np.zeros(3)
+_NO_SLOPE.setflags(write=False)
 
 
 def rotation(pose: Pose) -> Rotation:
@@ -139,11 +141,13 @@ class ScrewPath(ObjectPath):
 
     def axis(self, tilt: Array | float) -> Array:
         """See :meth:`ObjectPath.axis`: the same everywhere."""
+        if isinstance(tilt, float):  # every tick, and many times cheaper
+            return self.direction
         return np.broadcast_to(self.direction, (*np.shape(tilt), 3))
 
     def axis_slope(self, tilt: float) -> Array:
         """See :meth:`ObjectPath.axis_slope`: zero."""
-        return np.zeros(3)
+        return _NO_SLOPE
 
     def tilt(self, quaternion: Array) -> Array:
         """Tilt [rad] of measured orientations, (..., 4) wxyz: their twist about the axis.

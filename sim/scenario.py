@@ -4,7 +4,11 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import TYPE_CHECKING
+
+import numpy as np
+from scipy.spatial.transform import Rotation
 
 from sim.checks import axes, length, not_negative, positive, vector
 from sim.course import Pivot as Pivot
@@ -25,6 +29,7 @@ from sim.settings import (
     Tolerances,
 )
 from synthesis import InvalidInputError
+from synthesis.contact import Array
 
 if TYPE_CHECKING:
     from sim.shape import Shape
@@ -94,7 +99,16 @@ class Object:
         for moment in self.inertia:
             positive(f"{self.name}.inertia", moment)
         vector(f"{self.name}.center_of_mass", self.center_of_mass, 3)
-        Pose(quaternion=self.principal_axes)
+        vector(f"{self.name}.principal_axes", self.principal_axes, 4)
+        if not abs(math.hypot(*self.principal_axes) - 1.0) < 1e-3:  # normalised where it is used
+            valid = "a quaternion of length 1"
+            raise InvalidInputError(f"{self.name}.principal_axes", self.principal_axes, valid)
+
+    @cached_property
+    def inertia_O(self) -> Array:
+        """Inertia about the centre of mass in the object's axes [kg m^2], (3, 3)."""
+        R_OI = Rotation.from_quat(self.principal_axes, scalar_first=True).as_matrix()
+        return R_OI @ np.diag(self.inertia) @ R_OI.T
 
     def weighing(self, factor: float) -> Object:
         """The object with so many times the mass, and inertia in proportion."""

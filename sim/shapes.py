@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from abc import abstractmethod
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 from scipy.spatial.transform import Rotation
@@ -290,7 +291,7 @@ class MeshShape(Shape):
         positive("shape.scale", self.scale)
         self.mesh  # noqa: B018 - raises where it is no mesh
 
-    @property
+    @cached_property
     def mesh(self) -> Mesh:
         """What the file holds, scaled."""
         return read_mesh("shape.file", self.file, (self.scale,))

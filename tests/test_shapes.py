@@ -2,7 +2,7 @@
 
 import json
 import math
-from dataclasses import asdict
+from dataclasses import asdict, replace
 
 import mujoco
 import numpy as np
@@ -11,7 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
-from scenarios import scenario
+from scenarios import scenario, scenarios
 from sim.shapes import Box, Cylinder, HollowCylinder, MeshShape
 from synthesis import InvalidInputError
 
@@ -182,3 +182,25 @@ def test_a_senseless_shape_is_refused_by_name(make, message):
 def test_an_object_s_shape_is_part_of_a_run_s_configuration():
     text = json.dumps(asdict(BOX.object))
     assert json.loads(text)["shape"] == {"size": [0.3, 0.2, 0.1]}
+
+
+# --- the scenes ---
+
+
+def off_surface(scene):
+    """How far each contact is from its object's surface [m], and each hand's normal from it."""
+    shape = scene.object.shape
+    places = {h.name: h.p_OC_O for h in scene.hands} | {s.name: s.p_OP_O for s in scene.supports}
+    off = [math.dist(shape.closest(p).point, p) for p in places.values()]
+    return max(off), max(math.dist(shape.closest(h.p_OC_O).normal, h.normal_O) for h in scene.hands)
+
+
+@pytest.mark.parametrize("name", scenarios())
+def test_contacts_lie_on_the_object_s_surface(name):
+    scene = scenario(name)
+    distance, turn = off_surface(scene)
+    assert distance < ROUNDING and turn < ROUNDING
+    first = scene.hands[0]
+    x, y, z = np.subtract(first.p_OC_O, 1e-3 * np.array(first.normal_O)).tolist()
+    hands = (replace(first, p_OC_O=(x, y, z)), *scene.hands[1:])
+    assert off_surface(replace(scene, hands=hands))[0] == pytest.approx(1e-3, abs=ROUNDING)
