@@ -49,8 +49,11 @@ class Chosen:
         from scenarios.file import SUFFIX, open_source
         from scenarios.file_errors import FileError
         from sim.ik import PathError
+        from synthesis.errors import InvalidInputError
 
-        if not self.scenario.endswith(SUFFIX) or isinstance(error, FileError):
+        of_an_option = isinstance(error, InvalidInputError) and error.field.startswith("--")
+        named = isinstance(error, (FileError, OSError)) or of_an_option
+        if not self.scenario.endswith(SUFFIX) or named:
             return str(error)
         if not isinstance(error, PathError):
             return f"{self.scenario}: {error}"

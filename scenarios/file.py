@@ -52,6 +52,15 @@ def made(source: Source, allowed: tuple[Path, ...] = ()) -> Scenario:
     return build(source, _validated(source, ScenarioFile), Places(source, allowed))
 
 
+def read_tables(file: Path) -> ScenarioFile:
+    """What a scenario file says, table by table: also what is no part of the scenario itself.
+
+    Raises:
+        FileError: It is not valid, or says no more than what it is lifted from.
+    """
+    return _validated(open_source(file), ScenarioFile)
+
+
 def open_source(file: Path) -> Source:
     """The text of a file.
 
@@ -97,9 +106,7 @@ def _lifted(source: Source, table: LiftedFile, allowed: tuple[Path, ...]) -> Sce
     scenario = lifted(read(other, allowed))
     path, phases = scenario.path, scenario.phases
     if not isinstance(path, Pivot):
-        raise source.error(
-            key, f'"{table.lifted_from}"', "a scenario whose path is a tilt or screw"
-        )
+        raise source.error(key, f'"{table.lifted_from}"', "a scenario with a tilt or a screw")
     if table.after == "hold":
         last = max(tilting(phases))
         phases = (*phases[: last + 1], *HOLD)

@@ -10,11 +10,11 @@ from assets import ROBOTS
 from scenarios.file_contacts import make_hand, make_support
 from scenarios.file_errors import Key, Source
 from scenarios.file_models import ScenarioFile
-from scenarios.file_motion import RobotTable, ScrewTable, TiltTable
+from scenarios.file_motion import PosesTable, RobotTable, ScrewTable, TiltTable
 from scenarios.file_object import Thing, friction, make_object, make_surface, make_thing
 from scenarios.file_places import Places, apply, direction, only_one, orientation, vector
 from scenarios.file_settings_build import control, phases, physics, tolerances
-from sim.scenario import Pivot, Pose, Rest, Robot, Scenario, Support, View
+from sim.scenario import Pivot, Pose, Poses, Rest, Robot, Scenario, Support, View
 
 
 def build(source: Source, file: ScenarioFile, places: Places) -> Scenario:
@@ -102,7 +102,9 @@ def _robot(source: Source, index: int, table: RobotTable, places: Places) -> Rob
         )
 
 
-def _path(thing: Thing, table: TiltTable | ScrewTable) -> Pivot:
+def _path(thing: Thing, table: TiltTable | ScrewTable | PosesTable) -> Pivot | Poses:
+    if isinstance(table, PosesTable):
+        return _poses(thing, table)
     key: Key = ("path",)
     source = thing.source
     only_one(source, key, {"edge": table.edge, "point_m": table.point_m})
@@ -136,3 +138,13 @@ def _path(thing: Thing, table: TiltTable | ScrewTable) -> Pivot:
         pitch=pitch,
         travel=vector(travel),
     )
+
+
+def _poses(thing: Thing, table: PosesTable) -> Poses:
+    key: Key = ("path", "poses")
+    passed = [
+        Pose(vector(pose.position_m), orientation(thing.source, (*key, i), pose))
+        for i, pose in enumerate(table.poses)
+    ]
+    with thing.source.at(("path",)):
+        return Poses((thing.start, *passed))

@@ -97,12 +97,11 @@ def make_support(
         where: Key = ("environment", table.surface, "friction")
         raise source.error(where, "nothing", f"friction, such as {{ mu = 0.3 }}, for {name}")
     point = _support_point(thing, key, table)
-    closest, outward = surface_normal(
-        geoms[table.surface], front(surface), apply(thing.start, point)
-    )
+    p_W = apply(thing.start, point)
+    closest, outward = surface_normal(geoms[table.surface], front(surface), p_W)
     which = (*key, "corner" if table.corner is not None else "point_m")
-    what = f"{table.surface} with the object where it starts"
-    _check_near(source, which, point, undo(thing.start, closest), what)
+    moved = f", or object.position_m = {_shown(thing.start.position + closest - p_W)}"
+    _check_near(source, which, point, undo(thing.start, closest), table.surface, moved)
     normal = _normal(source, key, table.normal, direction(outward))
     return Support(
         name=name,
@@ -127,12 +126,18 @@ def _support_point(thing: Thing, key: Key, table: SupportTable) -> Vector:
 
 
 def _check_near(
-    source: Source, key: Key, p: Vector, closest: Sequence[float] | Array, what: str
+    source: Source,
+    key: Key,
+    p: Vector,
+    closest: Sequence[float] | Array,
+    what: str,
+    remedy: str = "",
 ) -> None:
     off = math.dist(p, closest)
     if not off <= ON_SURFACE:
         given = f"{_shown(p)}, {1e3 * off:.1f} mm off {what}"
-        raise source.error(key, given, f"a point on it, the nearest being {_shown(closest)}")
+        valid = f"a point on it, the nearest being {_shown(closest)}{remedy}"
+        raise source.error(key, given, valid)
 
 
 def _normal(source: Source, key: Key, given: list[float] | None, own: Vector) -> Vector:

@@ -75,7 +75,7 @@ class Source:
     """
 
     def __init__(self, file: Path, text: str) -> None:
-        self.file, self._lines = file, text.splitlines(keepends=True)
+        self.file, self._lines = file, [f"{line}\n" for line in text.split("\n")]
         try:
             self.data = tomllib.loads(text)
         except tomllib.TOMLDecodeError as error:

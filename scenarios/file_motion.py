@@ -15,6 +15,7 @@ from scenarios.file_keys import (
     Number,
     Placed,
     Positive,
+    Quaternion4,
     Table,
     Text,
     Vector3,
@@ -98,10 +99,36 @@ class ScrewTable(TurnTable):
     """Translation on top, in proportion to the tilt, at the end [m]."""
 
 
+class PoseTable(Table):
+    """A pose that the object passes."""
+
+    position_m: Vector3
+    """Position in the world [m]."""
+
+    rpy_deg: Vector3 | None = None
+    """Orientation as roll, pitch and yaw about the fixed axes x, y and z, in this order [deg]."""
+
+    quaternion: Quaternion4 | None = None
+    """Orientation as a quaternion wxyz, instead of rpy_deg."""
+
+
+class PosesTable(Table):
+    """Poses that the object passes, smoothly in between, from where it is at the start."""
+
+    kind: Literal["poses"]
+    """tilt, screw or poses."""
+
+    poses: Annotated[list[PoseTable], Len(1)]
+    """The poses after the start, each turned against the one before."""
+
+
 def _kind(path: Any) -> Any:
     return path.get("kind", "tilt") if isinstance(path, dict) else "tilt"
 
 
 AnyPath = Annotated[
-    Annotated[TiltTable, Tag("tilt")] | Annotated[ScrewTable, Tag("screw")], Discriminator(_kind)
+    Annotated[TiltTable, Tag("tilt")]
+    | Annotated[ScrewTable, Tag("screw")]
+    | Annotated[PosesTable, Tag("poses")],
+    Discriminator(_kind),
 ]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Protocol
@@ -9,6 +10,7 @@ from typing import Protocol
 import numpy as np
 from scipy.spatial.transform import Rotation
 
+from assets.packages import package_root
 from scenarios.file_errors import Key, Source, nearest
 from sim.scenario import Geom, Pose, Quaternion, Vector
 from sim.shape import Shape
@@ -118,7 +120,7 @@ def across(normal: Vector) -> Vector:
 
 
 def surface_normal(geom: Geom, front: Vector, p_W: Array) -> tuple[Array, Array]:
-    """The point of a fixed surface that is closest to a point, and its normal there, outwards.
+    """The place on a fixed surface that a point is at, or should be, and its normal, outwards.
 
     Args:
         geom: A plane, a box or a cylinder.
@@ -139,11 +141,14 @@ def surface_normal(geom: Geom, front: Vector, p_W: Array) -> tuple[Array, Array]
         shape = Box(vector([2.0 * half for half in geom.size]))
         extent = vector(geom.size)
     place = shape.closest(vector(p))
-    normal = -np.asarray(place.normal)
-    at_front = np.asarray(front).dot(place.point) - np.abs(front).dot(extent)
-    if abs(at_front) < ON_SURFACE:
-        normal = np.asarray(front)
-    return apply(geom.pose, place.point), turned(geom.pose, normal)
+    point, normal = np.asarray(place.point), -np.asarray(place.normal)
+    n = np.asarray(front)
+    in_front = np.clip(p, -np.asarray(extent), extent)
+    in_front += (np.abs(n).dot(extent) - n.dot(in_front)) * n
+    # On an edge, or off the surface, it is the front that counts.
+    if math.dist(p, point) > ON_SURFACE or math.dist(p, in_front) < ON_SURFACE:
+        point, normal = in_front, n
+    return apply(geom.pose, vector(point)), turned(geom.pose, normal)
 
 
 class Places:
@@ -178,11 +183,16 @@ class Places:
         """A model that ships, by its name, or the path of the file that a key names.
 
         Raises:
-            FileError: There is neither.
+            FileError: There is neither, or its package reaches beyond the folders allowed.
         """
         if given in shipped:
             return given
         if "." not in given and "/" not in given:
             valid = f"{nearest(given, list(shipped))}; or {what}"
             raise self._source.error(key, f'"{given}"', valid)
-        return str(self.file(key, given, what))
+        file = self.file(key, given, what)
+        root = package_root(file)
+        if not any(root.is_relative_to(folder) for folder in self._allowed):
+            valid = f"{what} whose package {root} is given with --allow-path, as it may read there"
+            raise self._source.error(key, given, valid)
+        return str(file)

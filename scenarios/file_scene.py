@@ -37,9 +37,13 @@ def _scene_key(source: Source, scenario: Scenario, field: str, given: str) -> Ke
     if "lifted_from" in source.data:
         return ("lifted_from",)
     head, *rest = field.split(".")
-    for hand in scenario.hands:
-        if head == hand.name:
-            return ("hands", head, "mount" if rest == ["mount"] else "tip")
+    for table, contacts in (("hands", scenario.hands), ("supports", scenario.supports)):
+        if head in [contact.name for contact in contacts]:
+            here = source.data[table][head]
+            names = [name for name in _CONTACT_KEYS.get(rest[0], ()) if name in here]
+            return (table, head, *names[:1])
+    if head in ("path", "object"):
+        return (head, *[name for name in rest[:1] if name in source.data[head]])
     for index, robot in enumerate(scenario.robots):
         if head == robot.label:
             return _robot_key(source, index, [*rest, given][:2])
@@ -48,6 +52,13 @@ def _scene_key(source: Source, scenario: Scenario, field: str, given: str) -> Ke
     return ()
 
 
+# Keys of a hand's or a support's table that hold what a field of the dataclass does.
+_CONTACT_KEYS = {
+    "mount": ("mount",),
+    "model": ("tip",),
+    "p_OC_O": ("point_m", "face"),
+    "p_OP_O": ("point_m", "corner"),
+}
 # Keys of a robot's table that hold what a field of the dataclass does.
 _ROBOT_KEYS = {
     "posture": ("posture_deg", "posture_rad", "posture_m"),

@@ -86,7 +86,16 @@ BROKEN = {
         'corner = "-x +y -z"', 'corner = "-x +y +z"', "edge_left.corner", "the nearest being"
     ),
     "object above the table": Broken(
-        "[0.65, 0.0, 0.05]", "[0.65, 0.0, 0.07]", "edge_left.corner", "the nearest being"
+        "[0.65, 0.0, 0.05]",
+        "[0.65, 0.0, 0.07]",
+        "edge_left.corner",
+        "or object.position_m = [0.65, 0, 0.05]",
+    ),
+    "object in the table": Broken(
+        "[0.65, 0.0, 0.05]",
+        "[0.65, 0.0, 0.02]",
+        "edge_left.corner",
+        "or object.position_m = [0.65, 0, 0.05]",
     ),
     "edge of one corner": Broken(
         EDGE, 'edge = ["-x -y -z", "-x -y -z"]', "path.edge", "two different corners"

@@ -52,6 +52,19 @@ def test_new_from_another_scenario_is_that_scenario(folder, capsys):
     assert scenario("again.toml").object == scenario("box-tilt").object
 
 
+def test_new_for_another_box_keeps_the_edge_and_fits_the_table(folder, capsys):
+    options = "--size 0.4 0.3 0.15 --weight 35 --friction 0.2 0.5"
+    assert ended(f"new mine {options}", capsys)[0] == 0
+    s, template = scenario("mine.toml"), read(TEMPLATE)
+    assert s.object.geoms[0].size == (0.2, 0.15, 0.075)
+    assert s.object.mass * 9.81 == pytest.approx(35.0)
+    assert [c.friction.mu for c in (*s.hands, *s.supports)] == [0.2, 0.2, 0.5, 0.5]
+    assert s.path.point_W == pytest.approx(template.path.point_W, abs=1e-12)
+    # The template is what the same rule makes of its own box.
+    assert ended("new same --size 0.3 0.2 0.1", capsys)[0] == 0
+    assert replace(scenario("same.toml"), name="template") == template
+
+
 def test_keys_that_are_switched_on_keep_to_the_schema():
     data = tomllib.loads(GOOD)
     on = re.sub(r"^#(?=[a-z_\[])", "", write(data, "schema"), flags=re.M)
@@ -69,6 +82,10 @@ def test_keys_that_are_switched_on_keep_to_the_schema():
         ("new mine --from sofa-tilt", "box-tilt, perhaps"),
         ("new mine --from none.toml", "No such file"),
         ("new mine --from good.txt", "ending in .toml"),
+        ("new mine --size 0.1 0 0.1", "a finite number > 0"),
+        ("new mine --weight nan", "a finite number > 0"),
+        ("new mine --friction 0.3", "--help"),
+        ("new mine --from box-tilt --weight 3", "left out with --from"),
     ],
 )
 def test_new_refuses_what_it_cannot_write(line, answer, folder, capsys):
@@ -126,6 +143,7 @@ def test_commands_take_a_file_and_its_replay_names_it(folder, capsys):
     assert ended("explain good.toml --json why.json", capsys)[0] == 0
     assert json.loads((folder / "why.json").read_text())["scenario"] == "good"
     assert ended("plan good.toml --points 20 --out plan", capsys)[0] == 0
+    assert ended("run good.toml --seed -1", capsys)[2].startswith("fulcrum: --seed: ")
     design = SweepCommand("good.toml", 1)._sweep()
     replay = design.replay(design.all_episodes()[0])
     assert replay.startswith("fulcrum run good.toml --controller")

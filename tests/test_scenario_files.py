@@ -208,6 +208,17 @@ def test_a_mesh_beside_the_file_is_read_and_one_elsewhere_where_it_is_allowed(fo
     assert (code, "tilt: got 100" in errors) == (2, True)
 
 
+def test_a_robot_whose_package_reaches_out_of_the_folder_is_refused(folder):
+    (folder.parent / "package.xml").write_text("<package><name>mine</name></package>")
+    (folder / "arm.urdf").write_text("<robot/>")
+    own = ('model = "baxter"', 'model = "arm.urdf"')
+    with pytest.raises(FileError, match="given with --allow-path"):
+        said(folder, own)
+    assert read(folder / "said.toml", (folder.parent,)).robots[0].model.endswith("arm.urdf")
+    (folder / "package.xml").write_text("<package><name>arm</name></package>")
+    assert said(folder, own).robots[0].model.endswith("arm.urdf")
+
+
 def test_a_post_is_a_cylinder_below_its_top(folder):
     post = (
         '[environment.post]\nkind = "post"\nsize_m = [0.1, 0.6]\nposition_m = [0.65, 0, 0]\n'
@@ -226,3 +237,23 @@ def test_a_post_is_a_cylinder_below_its_top(folder):
             ("[environment.table]", post),
             ("[supports.edge_left]", support.replace("[0, 0, -0.05]", "[0.1, 0, -0.05]")),
         )
+
+
+def test_poses_are_passed_from_the_start_on(folder):
+    # The corner at the origin of the turns is the box's edge.
+    turned = (
+        '[path]\nkind = "poses"\n\n[[path.poses]]\nposition_m = [0.45, 0.0, 0.15]\n'
+        "rpy_deg = [0, -90, 0]\n\n[manoeuvre]"
+    )
+    old = '[path]\nedge = ["-x +y -z", "-x -y -z"]\nangle_deg = 90.0\n\n[manoeuvre]'
+    path = said(folder, (old, turned)).path
+    assert path.angle_deg == pytest.approx(90.0)
+    assert path.point_W == pytest.approx((0.5, 0.0, 0.0), abs=1e-9)
+    scenario("said.toml")
+    # Poses that lift the edge are refused, as are those that do not turn.
+    lifting = turned.replace("[0.45, 0.0, 0.15]", "[0.45, 0.0, 0.25]")
+    for new, answer in ((lifting, "edge_left"), (turned.replace("-90", "0"), "a turn of")):
+        with pytest.raises(FileError, match=answer) as refused:
+            said(folder, (old, new))
+            scenario("said.toml")
+        assert refused.value.line is not None
