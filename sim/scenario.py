@@ -307,6 +307,11 @@ class Scenario:
         """Standard deviation of every driven joint's start [rad or m], by its name in the scene."""
         return {r.prefix + joint: r.start_deviation for r in self.robots for joint in r.posture}
 
+    def _repr_markdown_(self) -> str:
+        from sim.notebook import scenario_markdown
+
+        return scenario_markdown(self)
+
 
 def lifted(scenario: Scenario) -> Scenario:
     """The scenario without its environment contacts: the object lies there, but is to come off."""
