@@ -100,7 +100,13 @@ def _urdf(path: Path) -> mujoco.MjSpec:
     def make() -> list[NDArray]:
         from assets.urdf import mjcf_of, text  # trimesh takes a third of a second to import
 
-        return [np.frombuffer(text(mjcf_of(urdf, path)).encode(), np.uint8)]
+        try:
+            return [np.frombuffer(text(mjcf_of(urdf, path)).encode(), np.uint8)]
+        except ModelError:
+            raise
+        except (ValueError, LookupError) as error:  # an attribute is missing, or no number
+            given = f"{path.name} ({type(error).__name__}: {error})"
+            raise ModelError(given, "a URDF with all its names and numbers") from None
 
     (mjcf,) = cached(hashlib.sha256(b"\0".join(determined_by)).hexdigest(), make)
     return mujoco.MjSpec.from_string(mjcf.tobytes().decode())

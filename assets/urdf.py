@@ -202,9 +202,9 @@ def _dress(mjcf: ET.Element, robot: ET.Element) -> None:
         stated = {} if limit is None else limit.attrib
         effort, speed = (float(stated.get(key, 0.0)) for key in ("effort", "velocity"))
         motor = ET.SubElement(motors, "motor", name=name, joint=name)
-        if speed > 0.0:
+        if 0.0 < speed < np.inf:
             joint.set("user", _digits([speed]))
-        if effort > 0.0:
+        if 0.0 < effort < np.inf:
             motor.set("ctrlrange", _digits([-effort, effort]))
 
 

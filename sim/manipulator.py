@@ -15,8 +15,8 @@ class Robot:
     """A robot, its place and its start posture; joints go by their names in the model.
 
     Attributes:
-        model: Name of one that ships (see ``assets.ROBOTS``), or path of an MJCF file whose joints'
-            ``user`` numbers are their speed limits.
+        model: Name of one that ships (see ``assets.ROBOTS``), or path of a URDF or MJCF file;
+            ``assets/README.md`` says what is taken from it.
         posture: Start angle [rad or m] of every joint that is driven, from which inverse
             kinematics seeks; the other joints are locked at 0.
         prefix: Stands before the names of the robot's bodies, joints and geoms in the scene, so

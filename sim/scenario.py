@@ -264,6 +264,8 @@ class Scenario:
         for name in self.contact_names:
             if self.contact_names.count(name) > 1:
                 raise InvalidInputError("contact names", name, "a name that no other contact has")
+        if not self.robots:
+            raise InvalidInputError("robots", self.robots, "at least one robot")
         prefixes = [robot.prefix for robot in self.robots]
         for prefix in prefixes:
             if prefixes.count(prefix) > 1:

@@ -54,7 +54,9 @@ def compose(scenario: Scenario, motion: ObjectMotion = ObjectMotion.FREE) -> muj
     _add_object(spec, scenario, motion)
     if motion is ObjectMotion.FREE:
         _add_pairs(spec, scenario)
-        for first, second in unwanted_pairs(scenario, _compiled(spec)):
+    scene = _compiled(spec)
+    if motion is ObjectMotion.FREE:
+        for first, second in unwanted_pairs(scenario, scene):
             spec.add_pair(geomname1=first, geomname2=second)
     _add_view(spec, scenario)
     return spec
@@ -126,6 +128,7 @@ def _robots(scenario: Scenario) -> mujoco.MjSpec:
     for robot in sorted(scenario.robots, key=lambda robot: robot.prefix != ""):
         own = _robot(robot)
         if robot.prefix:
+            own.default.name = "robot"  # the main defaults of hands are called "main", too
             spec.attach(own, prefix=robot.prefix, frame=spec.worldbody.add_frame())
         else:
             spec = own
@@ -154,7 +157,7 @@ def _robot(robot: Robot) -> mujoco.MjSpec:
         if joint.name not in robot.posture:
             spec.delete(joint)
             continue
-        stated = [speed for speed in [*joint.userdata][:1] if speed > 0.0]
+        stated = [speed for speed in [*joint.userdata][:1] if 0.0 < speed < math.inf]
         speeds = [*stated, *(s for n, s in robot.speed_limits.items() if n == joint.name)]
         if not speeds:
             field = f"{robot.label}.speed_limits.{joint.name}"

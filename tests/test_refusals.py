@@ -91,6 +91,11 @@ def test_two_robots_with_the_same_prefix_are_refused():
         assert_refused(lambda t=twins: replace(BOX, robots=t), "robot.prefix", repr(prefix), "no ")
 
 
+def test_a_scene_without_a_robot_is_refused():
+    with pytest.raises(InvalidInputError, match=r"^robots: got \(\); valid is at least one robot"):
+        replace(BOX, robots=())
+
+
 def test_a_robot_model_that_neither_ships_nor_is_a_file_is_refused_by_name():
     assert_refused(lambda: with_robot(model="atlas"), "robot.model", "'atlas'", "baxter, gripper")
     with pytest.raises(InvalidInputError, match=r"^blue_robot\.model: got 'atlas'"):

@@ -9,8 +9,9 @@ import pytest
 from assets import velocity_limits
 from scenarios import scenario
 from sim.robot import RobotModel
-from sim.scenario import Pose
-from sim.scene import compose, hand_body
+from sim.scenario import Pose, Robot
+from sim.scene import ObjectMotion, compose, hand_body
+from synthesis import InvalidInputError
 
 BOX = scenario("box-tilt")
 
@@ -45,6 +46,22 @@ def test_two_robots_of_a_kind_stand_in_one_scene_under_their_prefixes(prefixes):
     # A chain of six frames at 1 m.
     np.testing.assert_allclose(apart, [0.0, 1.0, 0.0], rtol=0, atol=1e-14)
     assert np.abs(RobotModel(scene).start_deviation == 1e-4).all()
+
+
+def test_a_prefix_that_gives_a_body_another_robot_s_name_is_refused(tmp_path):
+    file = tmp_path / "arm.xml"
+    text = '<mujoco><worldbody><body name="{}"><geom size="1"/></body></worldbody></mujoco>'
+    file.write_text(text.format("b_bridge"))
+    scene = twins(("a_", "b_"))
+    compose(scene)
+    other = Robot(str(file), posture={})
+    for motion in ObjectMotion:
+        with pytest.raises(
+            InvalidInputError, match=r"^scene: got .*repeated name 'b_bridge' in body"
+        ):
+            compose(replace(scene, robots=(*scene.robots, other)), motion)
+    file.write_text(text.format("bridge"))
+    compose(replace(scene, robots=(*scene.robots, other)))
 
 
 def test_limits_of_a_robot_are_never_raised_above_what_its_model_says():
