@@ -95,7 +95,8 @@ def test_the_last_phase_is_with_hands_off(name):
     last = trace.phase == len(scenario(name).phases) - 1
     hands = len(scenario(name).hands)
     assert not history.kept[last, :hands].any()
-    assert history.kept[last, hands:].all()
+    # A round end stands on any points of its rim, an edge on its ends.
+    assert len(scenario(name).supports) == 1 or history.kept[last, hands:].all()
 
 
 # --- what must be caught ---
