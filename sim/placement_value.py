@@ -1,0 +1,232 @@
+"""How good a placement is, as one number, and how near to a good one a bad one is."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+from enum import StrEnum
+
+import mujoco
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from sim.ik import Grid, PathError, plan_joints
+from sim.path import ScrewPath
+from sim.poses import PathProblems
+from sim.scenario import Scenario
+from sim.scene import ObjectMotion, compose
+from sim.settings import Control
+from synthesis import InfeasibleError, Objective, SolverError, Synthesizer, UnboundedError
+from synthesis.relaxation import weight_range
+
+
+class Goal(StrEnum):
+    """What is sought over the whole path.
+
+    HEAVIEST: that the heaviest object can be held. LARGEST_MARGIN: that the contact which uses
+    most of its friction uses as little of it as forces can make it. LOWEST_TORQUE: that the joint
+    which uses most of its torque uses as little as forces can make it.
+    """
+
+    HEAVIEST = "heaviest"
+    LARGEST_MARGIN = "largest-margin"
+    LOWEST_TORQUE = "lowest-torque"
+
+
+@dataclass(frozen=True)
+class Steps:
+    """How closely a placement is looked at.
+
+    Attributes:
+        grid: Steps of the joint path.
+        solved: Pose error at which one of them counts as solved [m and rad].
+        tilt_deg: Step between the tilts at which forces are sought [deg].
+    """
+
+    grid: Grid
+    solved: float
+    tilt_deg: float
+
+
+# A cubic spline through the coarse steps is off by some 0.1 mm between them; the forces are sought
+# at the steps themselves. What is kept clear of between them is kept farther from.
+COARSE = Steps(Grid(15.0, gap_m=0.03, least=1, clearance_m=0.01), solved=1e-5, tilt_deg=15.0)
+FULL = Steps(Grid(), solved=1e-9, tilt_deg=5.0)
+
+# What a placement lacks, the worst first: each adds a share of 1 at most.
+_OVERLAPS, _OUT_OF_REACH, _STUCK, _WITHOUT_FORCES = 4.0, 3.0, 2.0, 1.0
+# Feasible placements cost less than this.
+_FEASIBLE = 0.999
+# Clearance of the robot's fixed parts, and from where distances count [m].
+_CLEARANCE, _DETECTION = 0.005, 0.05
+# Tilts at which the object's distance to them is taken.
+_LOOKS = 7
+
+
+@dataclass(frozen=True)
+class Value:
+    """What a placement is worth.
+
+    Attributes:
+        cost: What is minimised; below 1 where forces exist all along the path.
+        reason: Why none do; empty if they do.
+        heaviest: The heaviest object that can be held all along the path [N].
+        friction: Share of its friction that a contact uses, at the least [-]; infinite without
+            forces.
+        torque: Share of its limit that a joint uses, at the least [-]; infinite without forces.
+        clearance: Least distance of a joint to its limits [rad or m].
+    """
+
+    cost: float
+    reason: str = ""
+    heaviest: float = 0.0
+    friction: float = math.inf
+    torque: float = math.inf
+    clearance: float = 0.0
+
+    @property
+    def feasible(self) -> bool:
+        """Whether the arms can follow, and forces exist, all along the path."""
+        return not self.reason
+
+
+def assess(
+    scenario: Scenario,
+    control: Control,
+    goal: Goal,
+    steps: Steps = FULL,
+    tolerated: frozenset[tuple[str, str]] = frozenset(),
+    whole: bool = True,
+) -> Value:
+    """What a placement is worth.
+
+    Args:
+        scenario: The scene.
+        control: The controller, whose friction factor and preload count; of a robust one the
+            least friction of its uncertainty set, and its preload.
+        goal: What the cost is.
+        steps: How closely it is looked at.
+        tolerated: Geoms of fixed parts of the robot and of what surrounds it that may overlap.
+        whole: Whether all numbers are asked for, or the goal's alone.
+    """
+    depth, pair = _overlap(scenario, tolerated)
+    if depth > 0.0:
+        reason = f"{pair[0]} within {1e3 * _CLEARANCE:g} mm of {pair[1]}"
+        return Value(_OVERLAPS + depth / (1.0 + depth), reason)
+    try:
+        joint_path = plan_joints(scenario, steps.solved, steps.grid)
+    except PathError as error:
+        if not error.share:
+            return Value(_OUT_OF_REACH + error.error / (1.0 + error.error), f"{error}")
+        return Value(_STUCK + 1.0 - error.share, f"{error}")
+    margins = believed(control, scenario)
+    problems = PathProblems(scenario, margins, joint_path=joint_path)
+    tilts = problems.tilts(steps.tilt_deg).tolist()
+    synthesizer = Synthesizer()
+    spans = [_span(problems, tilt, synthesizer) for tilt in tilts]
+    weight, heaviest = problems.gravity(0.0).weight, min(high for _, high in spans)
+    clearance = float(joint_path.clearance.min())
+    lacks = [_lack(weight, *span) for span in spans]
+    if any(lacks):
+        worst = int(np.argmax(lacks))
+        low, high = spans[worst]
+        reason = f"at {tilts[worst]:.0f} deg forces hold {low:.4g} to {high:.4g} N"
+        if not high:
+            reason = f"at {tilts[worst]:.0f} deg no forces hold any weight"
+        cost = _WITHOUT_FORCES + float(np.mean(lacks))
+        return Value(cost, reason, heaviest, clearance=clearance)
+
+    def largest(objective: Objective, asked: Goal) -> float:
+        if not whole and goal is not asked:
+            return math.inf
+        return max(_best(problems, tilt, objective, synthesizer) for tilt in tilts)
+
+    friction = largest(Objective.FRICTION_MARGIN, Goal.LARGEST_MARGIN) * margins.friction_factor
+    torque = largest(Objective.MAX_TORQUE_UTILISATION, Goal.LOWEST_TORQUE)
+    costs = {
+        Goal.HEAVIEST: 1.0 / (1.0 + heaviest / weight),
+        Goal.LARGEST_MARGIN: friction,
+        Goal.LOWEST_TORQUE: torque,
+    }
+    return Value(min(costs[goal], _FEASIBLE), "", heaviest, friction, torque, clearance)
+
+
+def believed(control: Control, scenario: Scenario) -> Control:
+    """The fixed margins that stand for a control's: those of a robust one are its set's worst."""
+    if control.robustness is None:
+        return control
+    robustness = control.robustness
+    # Hands that cannot press so hard press as hard as they can.
+    preload = min(robustness.preload, *(hand.f_n_max for hand in scenario.hands))
+    return replace(
+        control,
+        friction_factor=1.0 - robustness.uncertainty.friction,
+        preload=max(control.preload, preload),
+        robustness=None,
+    )
+
+
+def touching(scenario: Scenario) -> frozenset[tuple[str, str]]:
+    """Fixed parts of the robot that touch what surrounds it as it stands: they were put there."""
+    return frozenset(pair for pair, depth in _depths(scenario).items() if depth > 0.0)
+
+
+def _overlap(
+    scenario: Scenario, tolerated: frozenset[tuple[str, str]]
+) -> tuple[float, tuple[str, str]]:
+    """How far fixed parts of the robot are within the clearance of others [m], and which most."""
+    depths = {p: d for p, d in _depths(scenario).items() if p not in tolerated}
+    if not depths:
+        return 0.0, ("", "")
+    worst = max(depths, key=lambda pair: depths[pair])
+    return depths[worst], worst
+
+
+def _depths(scenario: Scenario) -> dict[tuple[str, str], float]:
+    """How far each fixed part is within the clearance of object and environment [m]."""
+    model = compose(scenario, ObjectMotion.POSED).compile()
+    data = mujoco.MjData(model)
+    solid = [g for g in (*scenario.object.geoms, *scenario.environment) if g.solid]
+    around = [g.name for g in (*scenario.object.geoms, *scenario.environment)]
+    fixed = [
+        g
+        for g in range(model.ngeom)
+        if model.body_weldid[model.geom_bodyid[g]] == 0 and model.geom(g).name not in around
+    ]
+    path, thing = ScrewPath(scenario.path), model.body(scenario.object.name).mocapid[0]
+    depths: dict[tuple[str, str], float] = {}
+    for tilt in np.linspace(0.0, path.end, _LOOKS):
+        R_WO, data.mocap_pos[thing] = path.pose(float(tilt))
+        data.mocap_quat[thing] = Rotation.from_matrix(R_WO).as_quat(scalar_first=True)
+        mujoco.mj_kinematics(model, data)
+        for g in fixed:
+            for other in solid:
+                near = mujoco.mj_geomDistance(
+                    model, data, g, model.geom(other.name).id, _DETECTION, None
+                )
+                pair = model.geom(g).name, other.name
+                depths[pair] = max(depths.get(pair, 0.0), _CLEARANCE - near)
+    return depths
+
+
+def _span(problems: PathProblems, tilt: float, synthesizer: Synthesizer) -> tuple[float, float]:
+    """The lightest and heaviest object that can be held at a tilt [N]."""
+    try:
+        return weight_range(problems.problem(tilt), problems.gravity(tilt), synthesizer)
+    except (InfeasibleError, SolverError):
+        return 0.0, 0.0
+
+
+def _lack(weight: float, low: float, high: float) -> float:
+    """How far from a range a weight is: 0 within, 1 if there is none [-]."""
+    return max(0.0, 1.0 - high / weight, 1.0 - weight / low if low else 0.0)
+
+
+def _best(
+    problems: PathProblems, tilt: float, objective: Objective, synthesizer: Synthesizer
+) -> float:
+    try:
+        problem = replace(problems.problem(tilt), objective=objective)
+        return synthesizer.solve(problem).value
+    except (InfeasibleError, SolverError, UnboundedError):
+        return math.inf
