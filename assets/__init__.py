@@ -16,6 +16,14 @@ if TYPE_CHECKING:
 DESCRIPTIONS = "example-robot-data"
 """The wheel that holds the official descriptions; pure data, nothing in it can be imported."""
 
+ROBOTS: dict[str, str | None] = {
+    "baxter": "baxter_description/urdf/baxter.urdf",
+    "gripper": None,
+}
+"""The robots that ship, each with the description whose meshes recordings show."""
+HANDS = ("finger_tip", "palm_pad")
+"""The hands that ship."""
+
 _MESH_URI = "package://example-robot-data/robots/"
 _HERE = Path(__file__).parent
 
@@ -33,6 +41,33 @@ def asset_path(name: str) -> Path:
     if name not in valid:
         raise FileNotFoundError(f"asset: got {name!r}; valid is one of {', '.join(valid)}.")
     return _HERE / name
+
+
+def robot_path(model: str) -> Path:
+    """Path of a robot that ships, or of a file.
+
+    Raises:
+        FileNotFoundError: There is neither; the message lists the valid names.
+    """
+    return _shipped_or_file(model, tuple(ROBOTS))
+
+
+def hand_path(model: str) -> Path:
+    """Path of a hand that ships, or of a file.
+
+    Raises:
+        FileNotFoundError: There is neither; the message lists the valid names.
+    """
+    return _shipped_or_file(model, HANDS)
+
+
+def _shipped_or_file(model: str, shipped: tuple[str, ...]) -> Path:
+    if model in shipped:
+        return asset_path(f"{model}.xml")
+    if not Path(model).is_file():
+        valid = f"one of {', '.join(shipped)}, or the path of a file"
+        raise FileNotFoundError(f"model: got {model!r}; valid is {valid}.")
+    return Path(model)
 
 
 def description_path(relative: str) -> Path:

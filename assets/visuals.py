@@ -72,6 +72,11 @@ def load_visuals(urdf: str, links: Collection[str] | None = None) -> list[Visual
     return visuals
 
 
+def link_names(urdf: str) -> list[str]:
+    """Names of all links of a URDF."""
+    return [link.attrib["name"] for link in ET.fromstring(urdf).findall("link")]
+
+
 def pose_of(element: ET.Element) -> NDArray[np.float64]:
     """(4, 4) pose [m] in its `<origin>`: fixed-axis roll, pitch, yaw; identity without one."""
     origin = element.find("origin")

@@ -5,7 +5,6 @@ from sim.scenario import (
     Friction,
     Geom,
     Hand,
-    Object,
     Pivot,
     Pose,
     Robot,
@@ -13,6 +12,8 @@ from sim.scenario import (
     Support,
 )
 from sim.settings import LEAVE, REACH, TILT
+from sim.shape import homogeneous
+from sim.shapes import Box
 
 # Table II of the paper.
 WEIGHT = 20.0  # [N]
@@ -27,8 +28,6 @@ EDGE_X = 0.5  # [m] in front of Baxter's torso frame, on a table at its height
 # Hardly wider than the box: Baxter's wrists are thicker than the box is high and need room beside.
 TABLE_LENGTH, TABLE_WIDTH, TABLE_THICKNESS = 0.5, 0.24, 0.04  # [m]
 
-MASS = WEIGHT / GRAVITY
-_SOLID = MASS / 12.0
 # Elbows out to the side: of all postures at this place the one that is easiest on the shoulders.
 _POSTURE = {"s0": -0.06, "s1": 0.37, "e0": -1.17, "e1": 0.73, "w0": -0.07, "w1": 1.50, "w2": -1.03}
 _MIRRORED = ("s0", "e0", "w0", "w2")
@@ -38,7 +37,7 @@ def _hand(name: str, side: float) -> Hand:
     return Hand(
         name=name,
         mount=f"{name}_hand_link",
-        model="palm_pad.xml",
+        model="palm_pad",
         geom="box",
         p_OC_O=(ALONG - LENGTH / 2, side * WIDTH / 2, UP - HEIGHT / 2),
         normal_O=(0.0, -side, 0.0),
@@ -62,18 +61,7 @@ def _edge(name: str, side: float) -> Support:
 SCENARIO = Scenario(
     name="box-tilt",
     summary="Baxter pivots a 20 N box about its edge with both arms (paper, example 2)",
-    object=Object(
-        name="box",
-        mass=MASS,
-        inertia=(
-            _SOLID * (WIDTH**2 + HEIGHT**2),
-            _SOLID * (LENGTH**2 + HEIGHT**2),
-            _SOLID * (LENGTH**2 + WIDTH**2),
-        ),
-        geoms=(
-            Geom("box", "box", (LENGTH / 2, WIDTH / 2, HEIGHT / 2), rgba=(0.80, 0.62, 0.40, 0.5)),
-        ),
-    ),
+    object=homogeneous("box", Box((LENGTH, WIDTH, HEIGHT)), WEIGHT / GRAVITY),
     environment=(
         Geom(
             "table",
@@ -85,14 +73,15 @@ SCENARIO = Scenario(
     ),
     hands=(_hand("left", 1.0), _hand("right", -1.0)),
     supports=(_edge("edge_left", 1.0), _edge("edge_right", -1.0)),
-    robot=Robot(
-        model="baxter.xml",
-        description="baxter_description/urdf/baxter.urdf",
-        posture={
-            f"{side}_{joint}": -angle if side == "right" and joint in _MIRRORED else angle
-            for side in ("left", "right")
-            for joint, angle in _POSTURE.items()
-        },
+    robots=(
+        Robot(
+            model="baxter",
+            posture={
+                f"{side}_{joint}": -angle if side == "right" and joint in _MIRRORED else angle
+                for side in ("left", "right")
+                for joint, angle in _POSTURE.items()
+            },
+        ),
     ),
     path=Pivot(
         start=Pose((EDGE_X + LENGTH / 2, 0.0, HEIGHT / 2)),

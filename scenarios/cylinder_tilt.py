@@ -1,22 +1,20 @@
 """A parallel-jaw gripper tilts the hollow cylinder of Table I about its rim: paper, example 1."""
 
-import math
-
 from sim.scenario import (
     GRAVITY,
     Friction,
     Geom,
     Hand,
-    Object,
     Pivot,
     Pose,
     Robot,
     Scenario,
     Support,
-    Vector,
     View,
 )
 from sim.settings import HOLD, REACH, TILT, Control, Tolerances, stretched
+from sim.shape import homogeneous
+from sim.shapes import HollowCylinder
 
 # Table I of the paper, and the limit of a finger's force from its text.
 WEIGHT = 30.0  # [N]
@@ -37,9 +35,7 @@ FRICTION_FACTOR, PRELOAD = 0.85, 10.0
 # Softer than usual: at five times that, as with controller `robust`, the fingers keep their margin.
 BANDWIDTH = 20.0  # [rad/s]
 
-MASS = WEIGHT / GRAVITY
-_WALL = OUTER - INNER
-_STAVES = 32
+SHAPE = HollowCylinder(OUTER, INNER, LENGTH, axis="x")
 # Three layers of wall may stand before a force's arrow.
 _COLOR = (0.80, 0.55, 0.28, 0.22)
 # The gripper's: from the wrist's centre to the tips, and finger slides that leave the wall room.
@@ -50,7 +46,7 @@ def _finger(name: str, radius: float, side: float) -> Hand:
     return Hand(
         name=name,
         mount=f"{name}_finger",
-        model="finger_tip.xml",
+        model="finger_tip",
         geom="wall",
         p_OC_O=(LENGTH / 2 - DEPTH, 0.0, radius),
         normal_O=(0.0, 0.0, -side),
@@ -60,55 +56,10 @@ def _finger(name: str, radius: float, side: float) -> Hand:
     )
 
 
-def _stave(name: str, angle: float) -> Geom:
-    """A flat piece of the wall at an angle about the axis from the top.
-
-    Neighbours meet at the bore: pieces that overlap would show through one another.
-    """
-    middle = (OUTER + INNER) / 2
-    half_width = INNER * math.tan(math.pi / _STAVES)
-    return Geom(
-        name,
-        "box",
-        (LENGTH / 2, half_width, _WALL / 2),
-        Pose(
-            (0.0, -middle * math.sin(angle), middle * math.cos(angle)),
-            (math.cos(angle / 2), math.sin(angle / 2), 0.0, 0.0),
-        ),
-        rgba=_COLOR,
-    )
-
-
-def hollow_cylinder_inertia() -> Vector:
-    """Principal moments of the hollow cylinder along and across its axis [kg m^2]."""
-    along = MASS / 2 * (OUTER**2 + INNER**2)
-    across = MASS / 12 * (3 * (OUTER**2 + INNER**2) + LENGTH**2)
-    return along, across, across
-
-
 SCENARIO = Scenario(
     name="cylinder-tilt",
     summary="A parallel-jaw gripper tilts a 30 N hollow cylinder about its rim (paper, example 1)",
-    object=Object(
-        name="cylinder",
-        mass=MASS,
-        inertia=hollow_cylinder_inertia(),
-        geoms=(
-            # What stands on the floor, as a full cylinder has an exact rim point; the inner finger
-            # is inside it.
-            Geom(
-                "rim",
-                "cylinder",
-                (OUTER, LENGTH / 2),
-                Pose(quaternion=(math.sqrt(0.5), 0.0, math.sqrt(0.5), 0.0)),
-                rgba=(0.0, 0.0, 0.0, 0.0),
-                solid=False,
-            ),
-            # What the fingers hold, and the rest of the wall, which people see.
-            _stave("wall", 0.0),
-            *(_stave(f"stave_{i}", 2 * math.pi * i / _STAVES) for i in range(1, _STAVES)),
-        ),
-    ),
+    object=homogeneous("cylinder", SHAPE, WEIGHT / GRAVITY, _COLOR),
     environment=(
         Geom("floor", "plane", (0.9, 0.7, 0.05), Pose((0.3, 0.0, 0.0)), (0.75, 0.77, 0.80, 1.0)),
     ),
@@ -124,19 +75,21 @@ SCENARIO = Scenario(
             friction=RIM_FRICTION,
         ),
     ),
-    robot=Robot(
-        model="gripper.xml",
-        posture={
-            "slide_x": LENGTH - DEPTH + _TIP_TO_WRIST,
-            "slide_y": 0.0,
-            "slide_z": OUTER + (OUTER + INNER) / 2,
-            "wrist_pitch": 0.0,
-            "wrist_yaw": 0.0,
-            "wrist_roll": 0.0,
-            "outer_finger": _FINGER_Q,
-            "inner_finger": _FINGER_Q,
-        },
-        still=("outer_finger", "inner_finger"),
+    robots=(
+        Robot(
+            model="gripper",
+            posture={
+                "slide_x": LENGTH - DEPTH + _TIP_TO_WRIST,
+                "slide_y": 0.0,
+                "slide_z": OUTER + (OUTER + INNER) / 2,
+                "wrist_pitch": 0.0,
+                "wrist_yaw": 0.0,
+                "wrist_roll": 0.0,
+                "outer_finger": _FINGER_Q,
+                "inner_finger": _FINGER_Q,
+            },
+            still=("outer_finger", "inner_finger"),
+        ),
     ),
     path=Pivot(
         start=Pose((LENGTH / 2, 0.0, OUTER)),

@@ -41,7 +41,7 @@ class TiltTask(control.Task):
         self._path = ScrewPath(scenario.path)
         self._robot = RobotModel(scenario)
         self._start = plan_joints(scenario).start
-        self._deviation = scenario.robot.start_deviation
+        self._deviation = self._robot.start_deviation
         self._random = np.random.default_rng(seed)
         self._p_WC = np.zeros((len(scenario.contact_names), 3))
         self._f_W = np.zeros((len(scenario.contact_names), 4))

@@ -168,13 +168,13 @@ class _Follower:
             for hand in scenario.hands
         ]
         still = np.zeros(model.nv)
-        still[[model.joint(name).dofadr[0] for name in scenario.robot.still]] = 1.0
+        still[[model.joint(name).dofadr[0] for name in scenario.still]] = 1.0
         self._damping = mink.DampingTask(model, np.sqrt(_STILL_DAMPING) * still)
         self._radii = [float(model.geom(tip_geom(hand)).size[0]) for hand in scenario.hands]
         self._motor_joints = [int(model.actuator(i).trnid[0]) for i in range(model.nu)]
         speeds = velocity_limits(model)
         self._qd_max = np.array([speeds[model.joint(j).name] for j in range(model.njnt)])
-        q = np.array([scenario.robot.posture[model.joint(j).name] for j in range(model.njnt)])
+        q = np.array([scenario.posture[model.joint(j).name] for j in range(model.njnt)])
         self._configuration.update(q)
         self._pose_object(0.0)
         self._collisions = mink.CollisionAvoidanceLimit(

@@ -7,6 +7,7 @@ tilt: :math:`f = m\,\ddot c`, :math:`m_c = I \dot\omega + \omega \times I \omega
 from __future__ import annotations
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 from sim.path import ScrewPath
 from sim.scenario import Scenario
@@ -22,12 +23,14 @@ def inertial_wrenches(scenario: Scenario, path: ScrewPath, tilt: float) -> tuple
         tilt: :math:`\theta` [rad].
     """
     thing = scenario.object
-    center, inertia = np.asarray(thing.center_of_mass), np.asarray(thing.inertia)
+    center, moments = np.asarray(thing.center_of_mass), np.asarray(thing.inertia)
+    R_OI = Rotation.from_quat(thing.principal_axes, scalar_first=True).as_matrix()
     R_WO, _ = path.pose(tilt)
     slope, curvature = path.derivatives(tilt, center)
     omega = R_WO.T @ path.axis
     f_a, f_b = thing.mass * R_WO.T @ slope, thing.mass * R_WO.T @ curvature
-    m_a, m_b = inertia * omega, np.cross(omega, inertia * omega)
+    m_a = R_OI @ (moments * (omega @ R_OI))
+    m_b = np.cross(omega, m_a)
     return (
         np.concatenate([f_a, m_a + np.cross(center, f_a)]),
         np.concatenate([f_b, m_b + np.cross(center, f_b)]),

@@ -86,7 +86,7 @@ class ClosedLoop:
         self._sensors = Sensors(world, self._plant.joints)
         deviation = np.random.default_rng(seed).normal(size=len(robot.joints))
         try:
-            self._plant.reset(joint_path.start + scenario.robot.start_deviation * deviation)
+            self._plant.reset(joint_path.start + robot.start_deviation * deviation)
         except PhysicsError as error:
             raise DivergedError(0.0) from error
         self._dt = dt = self.truth.physics.timestep

@@ -1,7 +1,7 @@
-"""The controller's belief about the robot: a Pinocchio model of its arms, hands and limits.
+"""The controller's belief about the robots: a Pinocchio model of their arms, hands and limits.
 
-The model is read off the nominal scene, so that hands, locked joints and the robot's place need no
-second description; that it is the official robot is tested against the official URDF.
+The model is read off the nominal scene, so that hands, locked joints and the robots' places need no
+second description; that they are the official robots is tested against the official URDF.
 """
 
 from __future__ import annotations
@@ -28,6 +28,7 @@ class RobotModel:
         qd_max: Speed limits [rad/s or m/s], (l,).
         tau_min, tau_max: Torque limits [N·m or N], (l,).
         damping: Viscous joint friction [N·m·s/rad], (l,).
+        start_deviation: Standard deviation of the start posture [rad or m], (l,).
         tip_radii: Of the hands' tips [m], (n,).
     """
 
@@ -41,6 +42,8 @@ class RobotModel:
         self.qd_max = np.array([speeds[name] for name in self.joints])
         self.tau_min, self.tau_max = np.array([drive.ctrlrange for drive in drives]).T.copy()
         self.damping = scene.dof_damping[scene.jnt_dofadr[indices]].copy()
+
+        self.start_deviation = np.array([scenario.start_deviation[name] for name in self.joints])
 
         self._model = pinocchio_model(scene)
         # The second, for motion, leaves the first as of the last update.

@@ -4,8 +4,13 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
 
 from sim.checks import axes, length, not_negative, positive, vector
+from sim.manipulator import Robot as Robot
+from sim.pose import Pose as Pose
+from sim.pose import Quaternion as Quaternion
+from sim.pose import Vector as Vector
 from sim.settings import (
     FARTHEST_M,
     HOLD,
@@ -19,38 +24,25 @@ from sim.settings import (
 )
 from synthesis import InvalidInputError
 
+if TYPE_CHECKING:
+    from sim.shape import Shape
+
 GRAVITY = 9.81  # [m/s^2]
-
-Vector = tuple[float, float, float]
-Quaternion = tuple[float, float, float, float]
-
-
-@dataclass(frozen=True)
-class Pose:
-    """A frame's position [m] and orientation (quaternion wxyz) in its parent frame."""
-
-    position: Vector = (0.0, 0.0, 0.0)
-    quaternion: Quaternion = (1.0, 0.0, 0.0, 0.0)
-
-    def __post_init__(self) -> None:
-        vector("pose.position", self.position, 3)
-        vector("pose.quaternion", self.quaternion, 4)
-        # They are normalised where they are used, if their squares are numbers.
-        if not 1e-3 < math.hypot(*self.quaternion) < 1e3:
-            raise InvalidInputError("pose.quaternion", self.quaternion, "a quaternion of length 1")
 
 
 @dataclass(frozen=True)
 class Geom:
-    """A primitive in MuJoCo's terms.
+    """A primitive in MuJoCo's terms, or a mesh, which touches as its convex hull does.
 
     Attributes:
         name: Unique in the scene.
-        kind: Geom type as MuJoCo names it: plane, sphere, capsule, ellipsoid, cylinder, box.
-        size: Sizes as MuJoCo reads them (half extents; radius, half length) [m].
+        kind: Geom type as MuJoCo names it: plane, sphere, capsule, ellipsoid, cylinder, box, mesh.
+        size: Sizes as MuJoCo reads them (half extents; radius, half length) [m]; of a mesh its
+            scale, as one number or one along each axis.
         pose: Pose in the frame of the owner (object or world).
         rgba: Colour and opacity, each 0 to 1; geoms of opacity 0 are not drawn.
         solid: Whether the robot must keep clear of it (but for tips where they hold the object).
+        file: Of a mesh; None for all others.
     """
 
     name: str
@@ -59,6 +51,7 @@ class Geom:
     pose: Pose = Pose()
     rgba: tuple[float, float, float, float] = (0.6, 0.6, 0.6, 1.0)
     solid: bool = True
+    file: str | None = None
 
     def __post_init__(self) -> None:
         for size in self.size:
@@ -66,6 +59,9 @@ class Geom:
         if not 1 <= len(self.size) <= 3:
             raise InvalidInputError(f"{self.name}.size", self.size, "one to three numbers")
         vector(f"{self.name}.rgba", self.rgba, 4)
+        if (self.kind == "mesh") != (self.file is not None):
+            valid = "a file for the kind mesh, and none for any other"
+            raise InvalidInputError(f"{self.name}.file", self.file, valid)
 
 
 @dataclass(frozen=True)
@@ -75,9 +71,11 @@ class Object:
     Attributes:
         name: What people call it.
         mass: [kg].
-        inertia: Principal moments about the centre of mass, along the object's axes [kg m^2].
+        inertia: Principal moments about the centre of mass [kg m^2].
         center_of_mass: In the object frame [m].
-        geoms: Its shape; contacts refer to these by name.
+        geoms: What it is made of; contacts refer to these by name.
+        principal_axes: Orientation of the principal axes in the object frame, wxyz.
+        shape: What its geoms stand for, if it is a shape of :mod:`sim.shapes`.
     """
 
     name: str
@@ -85,6 +83,8 @@ class Object:
     inertia: Vector
     geoms: tuple[Geom, ...]
     center_of_mass: Vector = (0.0, 0.0, 0.0)
+    principal_axes: Quaternion = (1.0, 0.0, 0.0, 0.0)
+    shape: Shape | None = None
 
     def __post_init__(self) -> None:
         positive(f"{self.name}.mass", self.mass)
@@ -92,6 +92,7 @@ class Object:
         for moment in self.inertia:
             positive(f"{self.name}.inertia", moment)
         vector(f"{self.name}.center_of_mass", self.center_of_mass, 3)
+        Pose(quaternion=self.principal_axes)
 
     def weighing(self, factor: float) -> Object:
         """The object with so many times the mass, and inertia in proportion."""
@@ -127,15 +128,16 @@ class Hand:
 
     Attributes:
         name: Name of the contact and prefix of the hand's parts.
-        mount: Body of the robot that carries the hand.
-        model: Asset with a body ``pad`` that has a spherical geom ``tip`` and a site
-            ``tip_center``.
+        mount: Body of a robot that carries the hand, with the robot's prefix.
+        model: Name of one that ships (see ``assets.HANDS``), or path of an MJCF file with a body
+            ``pad`` that has a spherical geom ``tip`` and a site ``tip_center``.
         geom: The object's geom that is touched.
         p_OC_O: Contact point in the object frame [m].
         normal_O: Inward normal in the object's axes.
         tangent_O: First tangent in the object's axes, perpendicular to the normal.
         friction: Between tip and object.
         f_n_max: Largest allowed normal force [N].
+        mount_pose: Of the body ``pad`` on the mount.
     """
 
     name: str
@@ -147,6 +149,7 @@ class Hand:
     tangent_O: Vector
     friction: Friction
     f_n_max: float = math.inf
+    mount_pose: Pose = Pose()
 
     def __post_init__(self) -> None:
         axes(self.name, ("normal_O", self.normal_O), ("tangent_O", self.tangent_O))
@@ -195,36 +198,6 @@ class Rest:
     geom: str
     surface: str
     friction: Friction
-
-
-@dataclass(frozen=True)
-class Robot:
-    """The robot, its place and its start posture.
-
-    Attributes:
-        model: Asset (MJCF); joint speed limits are the joints' ``user`` number.
-        description: The URDF in example-robot-data whose meshes recordings show; None for none.
-        base: Pose of the model's root in the world.
-        posture: Start angle [rad or m] of every joint that is driven, from which inverse
-            kinematics seeks; the other joints are locked at 0.
-        still: Joints that move along the path only if the others cannot do it alone: the fingers
-            of a gripper, whose wrist carries them.
-        start_deviation: Standard deviation of the start posture from the planned one [rad or m],
-            drawn by the run's seed.
-    """
-
-    model: str
-    posture: dict[str, float]
-    description: str | None = None
-    still: tuple[str, ...] = ()
-    base: Pose = Pose()
-    start_deviation: float = 1e-4
-
-    def __post_init__(self) -> None:
-        for joint, angle in self.posture.items():
-            if not math.isfinite(angle):
-                raise InvalidInputError(f"robot.posture.{joint}", angle, "a finite number")
-        not_negative("robot.start_deviation", self.start_deviation)
 
 
 @dataclass(frozen=True)
@@ -280,7 +253,7 @@ class Scenario:
     environment: tuple[Geom, ...]
     hands: tuple[Hand, ...]
     supports: tuple[Support, ...]
-    robot: Robot
+    robots: tuple[Robot, ...]
     path: Pivot
     rests: tuple[Rest, ...] = ()
     phases: tuple[Phase, ...] = (*REACH, *TILT, *HOLD)
@@ -300,6 +273,11 @@ class Scenario:
         for name in self.contact_names:
             if self.contact_names.count(name) > 1:
                 raise InvalidInputError("contact names", name, "a name that no other contact has")
+        prefixes = [robot.prefix for robot in self.robots]
+        for prefix in prefixes:
+            if prefixes.count(prefix) > 1:
+                valid = "a prefix that no other robot has"
+                raise InvalidInputError("robot.prefix", repr(prefix), valid)
         geoms = [g.name for g in self.object.geoms]
         touched = [(hand.name, hand.geom) for hand in self.hands]
         touched += [(support.name, support.geom) for support in self.supports]
@@ -321,6 +299,22 @@ class Scenario:
     def contact_names(self) -> tuple[str, ...]:
         """Names of all contacts, hands first: the order of every per-contact array."""
         return (*(hand.name for hand in self.hands), *(support.name for support in self.supports))
+
+    @property
+    def posture(self) -> dict[str, float]:
+        """Start angle [rad or m] of every driven joint of all robots, by its name in the scene."""
+        robots = self.robots
+        return {r.prefix + joint: angle for r in robots for joint, angle in r.posture.items()}
+
+    @property
+    def still(self) -> tuple[str, ...]:
+        """Joints that keep still where they can, by their names in the scene."""
+        return tuple(robot.prefix + joint for robot in self.robots for joint in robot.still)
+
+    @property
+    def start_deviation(self) -> dict[str, float]:
+        """Standard deviation of every driven joint's start [rad or m], by its name in the scene."""
+        return {r.prefix + joint: r.start_deviation for r in self.robots for joint in r.posture}
 
 
 def lifted(scenario: Scenario) -> Scenario:

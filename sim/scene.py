@@ -1,14 +1,18 @@
-"""Composes a MuJoCo scene from a scenario's data: robot, hands, object, environment, contacts."""
+"""Composes a MuJoCo scene from a scenario's data: robots, hands, object, environment, contacts."""
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from enum import StrEnum
+from pathlib import Path
+from typing import Any
 
 import mujoco
 import numpy as np
 
-from assets import asset_path
-from sim.scenario import GRAVITY, Friction, Geom, Hand, Scenario
+from assets import hand_path, robot_path
+from sim.meshes import check_contacts, read_mesh
+from sim.scenario import GRAVITY, Friction, Geom, Hand, Robot, Scenario
 from synthesis import InvalidInputError
 
 # Solver tolerance of both the main and the noslip solver; tight, for runs are compared bit by bit.
@@ -16,7 +20,7 @@ _SOLVER_TOLERANCE = 1e-10
 
 _GEOM_TYPES = {
     kind: getattr(mujoco.mjtGeom, f"mjGEOM_{kind.upper()}")
-    for kind in ("plane", "sphere", "capsule", "ellipsoid", "cylinder", "box")
+    for kind in ("plane", "sphere", "capsule", "ellipsoid", "cylinder", "box", "mesh")
 }
 
 
@@ -34,11 +38,14 @@ def compose(scenario: Scenario, motion: ObjectMotion = ObjectMotion.FREE) -> muj
         InvalidInputError: The scenario names a joint, mount, part of a hand or geom type that does
             not exist, or a start angle outside its joint's range, or MuJoCo refuses the scene.
     """
-    spec = _robot_with_hands(scenario)
+    check_contacts(scenario)
+    spec = _robots(scenario)
+    for hand in scenario.hands:
+        _add_hand(spec, hand)
     spec.modelname = scenario.name
     _set_options(spec, scenario)
     for geom in scenario.environment:
-        _add_geom(spec.worldbody, geom)
+        _add_geom(spec, spec.worldbody, geom)
     _add_object(spec, scenario, motion)
     if motion is ObjectMotion.FREE:
         _add_pairs(spec, scenario)
@@ -97,67 +104,100 @@ def _set_options(spec: mujoco.MjSpec, scenario: Scenario) -> None:
     option.tolerance = option.noslip_tolerance = _SOLVER_TOLERANCE
 
 
-def _robot_with_hands(scenario: Scenario) -> mujoco.MjSpec:
-    robot = _asset("robot.model", scenario.robot.model)
-    _check_posture(robot, scenario)
-    for hand in scenario.hands:
-        mount = robot.body(hand.mount)
-        if mount is None:
-            bodies = ", ".join(body.name for body in robot.bodies)
-            raise InvalidInputError(f"{hand.name}.mount", hand.mount, f"one of {bodies}")
-        model = _hand_model(hand)
-        mount.add_frame().attach_body(model.body("pad"), f"{hand.name}_", "")
-    for actuator in list(robot.actuators):
-        if actuator.target not in scenario.robot.posture:
-            robot.delete(actuator)
-    for joint in list(robot.joints):
-        if joint.name not in scenario.robot.posture:
-            robot.delete(joint)
-    base = scenario.robot.base
-    for root in robot.worldbody.bodies:
+def _robots(scenario: Scenario) -> mujoco.MjSpec:
+    """All robots; MuJoCo attaches under a prefix only, so those that have one join the other."""
+    spec = mujoco.MjSpec()
+    for robot in sorted(scenario.robots, key=lambda robot: robot.prefix != ""):
+        own = _robot(robot)
+        if robot.prefix:
+            spec.attach(own, prefix=robot.prefix, frame=spec.worldbody.add_frame())
+        else:
+            spec = own
+    return spec
+
+
+def _robot(robot: Robot) -> mujoco.MjSpec:
+    """One robot at its base, with motors at the driven joints and the others locked."""
+    spec = _read(f"{robot.label}.model", robot.model, robot_path)
+    _check_joints(spec, robot)
+    for actuator in list(spec.actuators):
+        if actuator.target not in robot.posture:
+            spec.delete(actuator)
+        elif actuator.target in robot.torque_limits:
+            limit = robot.torque_limits[actuator.target]
+            low, high = actuator.ctrlrange
+            actuator.ctrlrange = [max(low, -limit), min(high, limit)]
+    for joint in list(spec.joints):
+        if joint.name not in robot.posture:
+            spec.delete(joint)
+        elif joint.name in robot.speed_limits:
+            speed, *others = joint.userdata
+            joint.userdata = [min(speed, robot.speed_limits[joint.name]), *others]
+    base = robot.base
+    for root in spec.worldbody.bodies:
         position, quaternion = np.zeros(3), np.zeros(4)
         mujoco.mju_mulPose(
             position, quaternion, base.position, base.quaternion, root.pos, root.quat
         )
         root.pos, root.quat = position, quaternion
-    return robot
+    return spec
 
 
-def _asset(field: str, name: str) -> mujoco.MjSpec:
+def _read(field: str, model: str, find: Callable[[str], Path]) -> mujoco.MjSpec:
     try:
-        path = asset_path(name)
+        path = find(model)
     except FileNotFoundError as missing:
-        raise InvalidInputError(field, repr(name), str(missing).partition("valid is ")[2]) from None
-    return mujoco.MjSpec.from_file(str(path))
+        raise InvalidInputError(
+            field, repr(model), str(missing).partition("valid is ")[2]
+        ) from None
+    try:
+        return mujoco.MjSpec.from_file(str(path))
+    except ValueError as error:
+        given = " ".join(str(error).split())
+        raise InvalidInputError(field, given, "a file that MuJoCo reads") from None
 
 
-def _check_posture(robot: mujoco.MjSpec, scenario: Scenario) -> None:
-    """Refuses start angles of joints that do not exist, or outside a joint's range."""
-    model = robot.copy().compile()
+def _check_joints(spec: mujoco.MjSpec, robot: Robot) -> None:
+    """Refuses joints that do not exist, and start angles outside a joint's range."""
+    model = spec.copy().compile()
     known = [model.joint(j).name for j in range(model.njnt)]
-    for name, angle in scenario.robot.posture.items():
-        if name not in known:
-            raise InvalidInputError("robot.posture", name, f"one of {', '.join(known)}")
+    for field in ("posture", "torque_limits", "speed_limits"):
+        for name in getattr(robot, field):
+            if name not in known:
+                valid = f"one of {', '.join(known)}"
+                raise InvalidInputError(f"{robot.label}.{field}", name, valid)
+    for name, angle in robot.posture.items():
         low, high = model.joint(name).range
         if model.joint(name).limited[0] and not low <= angle <= high:
-            raise InvalidInputError(f"robot.posture.{name}", angle, f"in [{low:g}, {high:g}]")
+            valid = f"in [{low:g}, {high:g}]"
+            raise InvalidInputError(f"{robot.label}.posture.{name}", angle, valid)
 
 
-def _hand_model(hand: Hand) -> mujoco.MjSpec:
-    model = _asset(f"{hand.name}.model", hand.model)
+def _add_hand(spec: mujoco.MjSpec, hand: Hand) -> None:
+    mount = spec.body(hand.mount)
+    if mount is None:
+        bodies = ", ".join(body.name for body in spec.bodies)
+        raise InvalidInputError(f"{hand.name}.mount", hand.mount, f"one of {bodies}")
+    model = _read(f"{hand.name}.model", hand.model, hand_path)
     for kind, part in (("body", "pad"), ("geom", "tip"), ("site", "tip_center")):
         if getattr(model, kind)(part) is None:
             raise InvalidInputError(f"{hand.name}.model", hand.model, f"one with a {kind} {part}")
-    return model
+    frame = mount.add_frame(pos=hand.mount_pose.position, quat=hand.mount_pose.quaternion)
+    frame.attach_body(model.body("pad"), f"{hand.name}_", "")
 
 
-def _add_geom(body: mujoco.MjsBody, geom: Geom) -> None:
+def _add_geom(spec: mujoco.MjSpec, body: mujoco.MjsBody, geom: Geom) -> None:
     if geom.kind not in _GEOM_TYPES:
         raise InvalidInputError(f"{geom.name}.kind", geom.kind, f"one of {', '.join(_GEOM_TYPES)}")
+    shape: dict[str, Any] = {"size": [*geom.size, 0.0, 0.0][:3]}
+    if geom.file is not None:
+        read = read_mesh(f"{geom.name}.file", geom.file, geom.size)
+        spec.add_mesh(name=geom.name, uservert=read.vertices.ravel(), userface=read.faces.ravel())
+        shape = {"meshname": geom.name}
     body.add_geom(
         name=geom.name,
         type=_GEOM_TYPES[geom.kind],
-        size=[*geom.size, 0.0, 0.0][:3],
+        **shape,
         pos=geom.pose.position,
         quat=geom.pose.quaternion,
         rgba=geom.rgba,
@@ -175,6 +215,7 @@ def _add_object(spec: mujoco.MjSpec, scenario: Scenario, motion: ObjectMotion) -
         quat=start.quaternion,
         mass=thing.mass,
         ipos=thing.center_of_mass,
+        iquat=thing.principal_axes,
         inertia=thing.inertia,
         explicitinertial=True,
         mocap=motion is ObjectMotion.POSED,
@@ -182,7 +223,7 @@ def _add_object(spec: mujoco.MjSpec, scenario: Scenario, motion: ObjectMotion) -
     if motion is ObjectMotion.FREE:
         body.add_freejoint(name=thing.name)
     for geom in thing.geoms:
-        _add_geom(body, geom)
+        _add_geom(spec, body, geom)
 
 
 def _add_pairs(spec: mujoco.MjSpec, scenario: Scenario) -> None:

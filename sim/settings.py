@@ -14,6 +14,8 @@ from synthesis.uncertainty_set import UncertaintySet
 _LONGEST_S = 600.0
 # A run's steps are to be counted, and kept [s].
 _SHORTEST_STEP_S = 1e-5
+# Iterations of a solver per step that a run can wait for.
+_MOST_ITERATIONS = 10_000
 # No arm reaches farther, and the joint path takes a step every 5 mm [m].
 FARTHEST_M = 10.0
 
@@ -260,6 +262,9 @@ class Physics:
             raise InvalidInputError("physics.timestep", self.timestep, valid)
         positive("physics.impratio", self.impratio)
         whole("physics.noslip_iterations", self.noslip_iterations, least=0)
+        if self.noslip_iterations > _MOST_ITERATIONS:
+            valid = f"at most {_MOST_ITERATIONS}"
+            raise InvalidInputError("physics.noslip_iterations", self.noslip_iterations, valid)
         length("physics.solimp", self.solimp, 3)
         for name in ("solref", "solref_friction"):
             length(f"physics.{name}", getattr(self, name), 2)

@@ -154,6 +154,7 @@ class World:
             inertia=_scaled(self.mass * self.size**2, thing.inertia),
             geoms=geoms,
             center_of_mass=_vector(center),
+            shape=None if thing.shape is None else thing.shape.scaled(self.size),
         )
 
     def _hand(self, hand: Hand, friction: float, place: tuple[float, float]) -> Hand:

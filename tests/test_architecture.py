@@ -18,9 +18,11 @@ ALLOWED = {
 SIMULATORS = {"mujoco", "dm_control", "dm_env", "mink", "pinocchio", "rerun"}
 STEPS = {"mj_step", "mj_step1", "mj_step2"}
 MAX_LINES = 350
-# Names of MuJoCo and Rerun for a cuboid; nothing else in `synthesis` and `sim` may say the words.
+# Names for a cuboid, of MuJoCo, Rerun and ours; `synthesis` and `sim` may not say the words else.
 API_WORDS = re.compile(
     r"mjGEOM_BOX\b|Boxes3D\b|\"box\"|plane, sphere, capsule, ellipsoid, cylinder, box\b"
+    r"|\bBox(?=\(|:$)",
+    re.MULTILINE,
 )
 FILES = sorted(path for package in PACKAGES for path in (ROOT / package).rglob("*.py"))
 

@@ -93,7 +93,7 @@ def test_actions_are_torques_within_their_limits(name):
 @each_scenario
 def test_observations_have_their_names_and_shapes(name):
     scene = scenario(name)
-    joints, contacts = len(scene.robot.posture), len(scene.contact_names)
+    joints, contacts = len(scene.posture), len(scene.contact_names)
     environment = make_environment(scene)
     expected = {
         "joint_positions": (joints,),
@@ -184,11 +184,11 @@ def test_another_seed_or_episode_starts_elsewhere_but_near(name):
     for a, b in itertools.combinations(starts, 2):
         assert (a != b).all()
         # Six standard deviations of a difference, of 14 joints.
-        assert np.abs(a - b).max() < 6.0 * np.sqrt(2.0) * scene.robot.start_deviation
+        assert np.abs(a - b).max() < 6.0 * np.sqrt(2.0) * scene.robots[0].start_deviation
 
 
 def test_without_deviation_every_seed_starts_alike():
-    exact = replace(BOX, robot=replace(BOX.robot, start_deviation=0.0))
+    exact = replace(BOX, robots=(replace(BOX.robots[0], start_deviation=0.0),))
     starts = [make_environment(exact, s).reset().observation["joint_positions"] for s in (3, 4)]
     np.testing.assert_array_equal(starts[0], starts[1])
 

@@ -15,7 +15,7 @@ from sim.ik import PathError, plan_joints
 from sim.poses import PathProblems
 from sim.recording.scenery import Scenery
 from sim.robot import RobotModel
-from sim.scenario import GRAVITY, Scenario
+from sim.scenario import GRAVITY, Pose, Scenario
 from sim.scene import compose, tip_geom, tip_site
 from sim.settings import Control, stretched
 from synthesis import InfeasibleError, Synthesizer
@@ -144,7 +144,7 @@ def test_pinocchio_and_mujoco_agree_on_slides_and_hinges(scene):
 
 def test_the_fingers_share_the_stage_but_not_each_other():
     robot = RobotModel(SCENARIO)
-    robot.update(np.array([SCENARIO.robot.posture[name] for name in robot.joints]))
+    robot.update(np.array([SCENARIO.posture[name] for name in robot.joints]))
     J_C = robot.contact_jacobians(np.zeros((2, 3)), np.array([np.eye(3)] * 2))
     np.testing.assert_array_equal(J_C[0, 3:, :6], J_C[1, 3:, :6])
     moves = np.abs(J_C).max(axis=1) > 1e-9
@@ -214,7 +214,7 @@ def test_the_full_cylinder_that_rolls_on_the_floor_is_neither_obstacle_nor_drawn
 def test_the_fingers_keep_still_while_the_stage_moves():
     # Still joints take the share 1e-8 / 1e-2 of the 0.8 m that the stage goes.
     assert np.ptp(tilting(to(SCENARIO, FAR))[:, 6:], axis=0).max() < 1e-5
-    restless = replace(SCENARIO, robot=replace(SCENARIO.robot, still=()))
+    restless = replace(SCENARIO, robots=(replace(SCENARIO.robots[0], still=()),))
     assert np.ptp(tilting(to(restless, 20.0))[:, 6:], axis=0).max() > 1e-2
 
 
@@ -222,9 +222,7 @@ def test_the_fingers_keep_still_while_the_stage_moves():
     ("change", "reason"),
     [
         (
-            lambda s: replace(
-                s, robot=replace(s.robot, base=replace(s.robot.base, position=(0.6, 0.0, 0.0)))
-            ),
+            lambda s: replace(s, robots=(replace(s.robots[0], base=Pose((0.6, 0.0, 0.0))),)),
             "slide_x at its lower limit -0.500 m",
         ),
         (

@@ -136,7 +136,7 @@ def watched_pairs(scene, model, start):
 
 def nearest(scene, model, path, where):
     """Smallest distance of watched geoms, up to 50 mm [m], and between which."""
-    posture = [scene.robot.posture[model.joint(int(j)).name] for j in model.actuator_trnid[:, 0]]
+    posture = [scene.posture[model.joint(int(j)).name] for j in model.actuator_trnid[:, 0]]
     pairs = watched_pairs(scene, model, posed(scene, model, posture, 0.0))
     assert len(pairs) > 100
     best = np.inf, ""
@@ -233,16 +233,14 @@ def test_a_contact_point_that_is_no_number_is_refused_by_name():
         replace(BOX.hands[0], p_OC_O=(np.nan, 0.1, 0.0))
 
 
-def with_robot(tmp_path, monkeypatch, edit):
-    """Makes the scene's robot an edited copy of Baxter; the scenario's data cannot do that."""
+def with_robot(tmp_path, edit):
+    """The box scene with an edited copy of Baxter."""
     spec = mujoco.MjSpec.from_file(str(asset_path("baxter.xml")))
     edit(spec)
     spec.compile()
-    copy = tmp_path / "baxter.xml"
+    copy = tmp_path / "edited.xml"
     copy.write_text(spec.to_xml())
-    monkeypatch.setattr(
-        "sim.scene.asset_path", lambda name: copy if name == "baxter.xml" else asset_path(name)
-    )
+    return replace(BOX, robots=(replace(BOX.robots[0], model=str(copy)),))
 
 
 @pytest.mark.parametrize(
@@ -252,33 +250,34 @@ def with_robot(tmp_path, monkeypatch, edit):
         ("right", 0.7, 1.1, "right_w2 at its lower limit 0.700 rad"),
     ],
 )
-def test_a_joint_range_in_the_way_is_named(tmp_path, monkeypatch, side, low, high, reason):
+def test_a_joint_range_in_the_way_is_named(tmp_path, side, low, high, reason):
     def narrow(spec):
         spec.joint(f"{side}_w2").range = [low, high]
 
-    with_robot(tmp_path, monkeypatch, narrow)
+    edited = with_robot(tmp_path, narrow)
     # The unrestricted path leaves that range soon; the arm's redundancy makes up for it till late.
-    reasons = assert_stopped(BOX, reason, 45.0, 89.0)
+    reasons = assert_stopped(edited, reason, 45.0, 89.0)
     assert all(r.startswith(side) for r in reasons)
 
 
-def test_an_unedited_copy_of_the_robot_is_planned_alike(tmp_path, monkeypatch):
-    with_robot(tmp_path, monkeypatch, lambda spec: None)
+def test_an_unedited_copy_of_the_robot_is_planned_alike(tmp_path):
+    edited = with_robot(tmp_path, lambda spec: None)
     # The copy is printed with six digits; the largest joint angle is 2 rad.
-    for q, expected in zip(plan_joints(BOX).q, planned("box-tilt").q, strict=True):
+    for q, expected in zip(plan_joints(edited).q, planned("box-tilt").q, strict=True):
         np.testing.assert_allclose(q, expected, rtol=0, atol=1e-4)
 
 
-def test_limits_of_a_slide_are_in_metres(tmp_path, monkeypatch):
+def test_limits_of_a_slide_are_in_metres(tmp_path):
     def on_a_rail(spec):
         rail = spec.joint("left_s0")
         rail.type, rail.axis = mujoco.mjtJoint.mjJNT_SLIDE, [1.0, 0.0, 0.0]
         rail.range = [-0.05, 0.05]
 
-    with_robot(tmp_path, monkeypatch, on_a_rail)
-    robot = replace(BOX.robot, posture={**BOX.robot.posture, "left_s0": 0.0})
+    edited = with_robot(tmp_path, on_a_rail)
+    (robot,) = edited.robots
+    robot = replace(robot, posture={**robot.posture, "left_s0": 0.0})
     with pytest.raises(PathError) as error:
-        plan_joints(moved(replace(BOX, robot=robot), 0.4))
+        plan_joints(moved(replace(edited, robots=(robot,)), 0.4))
     told = [r for r in error.value.reasons if "left_s0" in r]
     assert told
     assert all(re.search(r"limit -?0\.05\d* m$", r) for r in told), told

@@ -191,7 +191,7 @@ def standing(geom, support):
         BOX,
         object=replace(BOX.object, geoms=(geom,)),
         supports=(replace(BOX.supports[0], p_OP_O=support),),
-        robot=replace(BOX.robot, posture={}),
+        robots=(replace(BOX.robots[0], posture={}),),
     )
     plant = Plant(scene)
     plant.reset(np.zeros(0))

@@ -131,8 +131,8 @@ def test_a_fast_but_finite_state_is_none():
 
 def creep(physics, share):
     """Speed of a resting box on the table under a sideways push, a share of its friction [µm/s]."""
-    nobody = replace(BOX.robot, posture={})
-    model = compose(replace(BOX, robot=nobody, physics=physics)).compile()
+    nobody = (replace(BOX.robots[0], posture={}),)
+    model = compose(replace(BOX, robots=nobody, physics=physics)).compile()
     data = mujoco.MjData(model)
     data.xfrc_applied[model.body("box").id, 0] = share * BOX.supports[0].friction.mu * WEIGHT
     settling = round(0.5 / physics.timestep)

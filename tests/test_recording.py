@@ -80,7 +80,7 @@ def test_meshes_are_real_and_placed_by_moving_links(content):
 
 def test_every_scalar_series_is_the_trace_at_full_rate(content, result):
     trace, history = result.trace, result.history
-    robot = json.loads(content.text("config")[8:-4])["scenario"]["robot"]
+    robot = json.loads(content.text("config")[8:-4])["scenario"]["robots"][0]
     tilt = np.degrees(np.column_stack([trace.tilt_ref, trace.tilt]))
     expected = {
         "tilt": tilt,

@@ -20,10 +20,19 @@ from sim.settings import Physics, Tolerances, stretched
 from synthesis import InvalidInputError
 
 BOX = scenario("box-tilt")
+NO_NUMBER_ABOVE_0 = (0.0, -1.0, math.nan, math.inf)
 
 
 def with_hand(**changes):
     return replace(BOX, hands=(replace(BOX.hands[0], **changes), BOX.hands[1]))
+
+
+def with_robot(**changes):
+    return replace(BOX, robots=(replace(BOX.robots[0], **changes),))
+
+
+def with_posture(**angles):
+    return with_robot(posture={**BOX.robots[0].posture, **angles})
 
 
 def with_support(**changes):
@@ -40,18 +49,59 @@ def assert_refused(make, field, given, valid):
 
 
 def test_the_scenario_itself_is_composed():
-    assert compose(with_hand()).compile().nu == len(BOX.robot.posture)
+    assert compose(with_hand()).compile().nu == len(BOX.posture)
 
 
 def test_a_joint_that_the_robot_lacks_is_refused_by_name():
-    robot = replace(BOX.robot, posture={**BOX.robot.posture, "left_s9": 0.1})
-    assert_refused(lambda: replace(BOX, robot=robot), "robot.posture", "left_s9", "left_s0")
+    assert_refused(lambda: with_posture(left_s9=0.1), "robot.posture", "left_s9", "left_s0")
 
 
 def test_a_mount_that_the_robot_lacks_is_refused_by_name():
     assert_refused(
         lambda: with_hand(mount="left_foot"), "left.mount", "left_foot", "left_hand_link"
     )
+
+
+@pytest.mark.parametrize("field", ["torque_limits", "speed_limits"])
+def test_a_limit_of_a_joint_that_the_robot_lacks_is_refused_by_name(field):
+    assert_refused(
+        lambda: with_robot(**{field: {"left_s9": 1.0}}), f"robot.{field}", "left_s9", "left_s0"
+    )
+    compose(with_robot(**{field: {"left_s0": 1.0}}))
+
+
+@pytest.mark.parametrize("limit", NO_NUMBER_ABOVE_0)
+def test_a_limit_that_is_no_positive_number_is_refused_by_name(limit):
+    assert_refused(
+        lambda: with_robot(torque_limits={"left_s0": limit}),
+        "robot.torque_limits.left_s0",
+        limit,
+        "> 0",
+    )
+
+
+def test_a_joint_that_is_to_keep_still_but_is_not_driven_is_refused_by_name():
+    assert_refused(lambda: with_robot(still=("left_s9",)), "robot.still", "left_s9", "left_s0")
+
+
+def test_two_robots_with_the_same_prefix_are_refused():
+    (robot,) = BOX.robots
+    for prefix in ("", "blue_"):
+        twins = (replace(robot, prefix=prefix),) * 2
+        assert_refused(lambda t=twins: replace(BOX, robots=t), "robot.prefix", repr(prefix), "no ")
+
+
+def test_a_robot_model_that_neither_ships_nor_is_a_file_is_refused_by_name():
+    assert_refused(lambda: with_robot(model="atlas"), "robot.model", "'atlas'", "baxter, gripper")
+    with pytest.raises(InvalidInputError, match=r"^blue_robot\.model: got 'atlas'"):
+        compose(with_robot(model="atlas", prefix="blue_"))
+
+
+def test_a_robot_file_that_mujoco_does_not_read_is_refused_by_name(tmp_path):
+    broken = tmp_path / "robot.xml"
+    broken.write_text("<mujoco><bodi/></mujoco>")
+    with pytest.raises(InvalidInputError, match=r"^robot\.model: got .*a file that MuJoCo reads"):
+        compose(with_robot(model=str(broken)))
 
 
 def test_a_geom_kind_that_mujoco_lacks_is_refused_by_name():
@@ -82,13 +132,11 @@ def test_two_frictions_between_the_same_geoms_are_refused():
 
 
 def test_a_hand_model_that_is_not_shipped_is_refused_by_name():
-    with pytest.raises(InvalidInputError, match=r"'claw.xml'.*palm_pad.xml"):
+    with pytest.raises(InvalidInputError, match=r"'claw.xml'.*palm_pad"):
         compose(with_hand(model="claw.xml"))
 
 
 # --- what a dataclass refuses when it is made ---
-
-NO_NUMBER_ABOVE_0 = (0.0, -1.0, math.nan, math.inf)
 
 
 @pytest.mark.parametrize("value", NO_NUMBER_ABOVE_0)
@@ -185,18 +233,16 @@ def test_a_scenario_without_phases_is_refused():
 
 @pytest.mark.parametrize("angle", [1.71, -1.71])
 def test_a_start_angle_outside_its_joint_s_range_is_refused_by_name(angle):
-    robot = replace(BOX.robot, posture={**BOX.robot.posture, "left_s0": angle})
     assert_refused(
-        lambda: replace(BOX, robot=robot), "robot.posture.left_s0", angle, "[-1.70168, 1.70168]"
+        lambda: with_posture(left_s0=angle), "robot.posture.left_s0", angle, "[-1.70168, 1.70168]"
     )
-    robot = replace(BOX.robot, posture={**BOX.robot.posture, "left_s0": angle / 1.01})
-    compose(replace(BOX, robot=robot))
+    compose(with_posture(left_s0=angle / 1.01))
 
 
 @pytest.mark.parametrize("angle", [math.nan, math.inf])
 def test_a_start_angle_that_is_no_number_is_refused_by_name(angle):
     with pytest.raises(InvalidInputError, match=rf"^robot\.posture\.left_s0: got {angle}; valid"):
-        replace(BOX.robot, posture={**BOX.robot.posture, "left_s0": angle})
+        with_posture(left_s0=angle)
 
 
 @pytest.mark.parametrize(
@@ -207,18 +253,13 @@ def test_a_start_angle_that_is_no_number_is_refused_by_name(angle):
         ('site name="tip_center"', 'site name="centre"', "site tip_center"),
     ],
 )
-def test_a_hand_without_one_of_its_parts_is_refused_by_name(
-    tmp_path, monkeypatch, right, wrong, missing
-):
+def test_a_hand_without_one_of_its_parts_is_refused_by_name(tmp_path, right, wrong, missing):
     pad, copy = asset_path("palm_pad.xml").read_text(), tmp_path / "palm_pad.xml"
-    monkeypatch.setattr(
-        "sim.scene.asset_path", lambda name: copy if name == "palm_pad.xml" else asset_path(name)
-    )
     copy.write_text(pad)
-    compose(BOX)
+    compose(with_hand(model=str(copy)))
     assert right in pad
     copy.write_text(pad.replace(right, wrong))
-    assert_refused(lambda: BOX, "left.model", "palm_pad.xml", missing)
+    assert_refused(lambda: with_hand(model=str(copy)), "left.model", str(copy), missing)
 
 
 def test_a_ball_joint_is_refused_by_name():

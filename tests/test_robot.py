@@ -64,7 +64,7 @@ def test_joints_and_limits_are_in_the_order_of_the_motors(name):
     belief, model = robot(name), plant_model(scenario(name))
     motors = [model.joint(int(j)).name for j in model.actuator_trnid[:, 0]]
     assert list(belief.joints) == motors
-    assert set(motors) == set(scenario(name).robot.posture)
+    assert set(motors) == set(scenario(name).posture)
     np.testing.assert_array_equal(
         np.column_stack([belief.tau_min, belief.tau_max]), model.actuator_ctrlrange
     )

@@ -30,7 +30,7 @@ each_scenario = pytest.mark.parametrize("name", scenarios())
 def test_a_moved_and_turned_base_changes_gravity_as_in_mujoco():
     turn = Rotation.from_rotvec([0.4, -0.3, 0.8]).as_quat(scalar_first=True)
     base = Pose((0.1, -0.2, 0.3), tuple(turn.tolist()))
-    moved = replace(BOX, robot=replace(BOX.robot, base=base))
+    moved = replace(BOX, robots=(replace(BOX.robots[0], base=base),))
     belief = RobotModel(moved)
     found = deviation(moved, plant_model(moved), belief)
     assert max(found.values()) < ROUNDING, found

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from assets import asset_path
+from assets import asset_path, robot_path
 from scenarios import scenario, scenarios
 from scenarios.scenes import scene_xml
 from sim.scenario import Friction, Geom, Pose
@@ -161,7 +161,7 @@ def expected_unwanted(scene, model):
     for body in range(model.nbody):
         parent = int(model.body_parentid[body])
         own = {model.joint(j).name for j in range(model.njnt) if model.jnt_bodyid[j] == body}
-        if own & set(scene.robot.posture) or parent in carried:
+        if own & set(scene.posture) or parent in carried:
             carried.add(body)
     links = [model.geom(g).name for g in range(model.ngeom) if model.geom_bodyid[g] in carried]
     touching = {frozenset((tip_geom(hand), hand.geom)) for hand in scene.hands}
@@ -238,40 +238,51 @@ def test_environment_stands_where_the_scenario_puts_it():
 def test_only_driven_joints_move_and_each_has_its_motor(scene):
     model = composed(scene.name)
     joints = names(model, "joint", model.njnt)
-    driven = set(scene.robot.posture)
+    driven = set(scene.posture)
     assert set(joints) == driven | {scene.object.name}
     motors = [model.joint(int(j)).name for j in model.actuator_trnid[:, 0]]
     assert sorted(motors) == sorted(driven)
-    official = mujoco.MjModel.from_xml_path(str(asset_path(scene.robot.model)))
-    motor_of = {official.joint(int(j)).name: i for i, j in enumerate(official.actuator_trnid[:, 0])}
-    for i, name in enumerate(motors):
-        limits = official.actuator(motor_of[name]).ctrlrange
-        np.testing.assert_array_equal(model.actuator(i).ctrlrange, limits)
-        np.testing.assert_array_equal(model.joint(name).range, official.joint(name).range)
-        assert model.joint(name).damping == official.joint(name).damping
+    for robot in scene.robots:
+        official = mujoco.MjModel.from_xml_path(str(robot_path(robot.model)))
+        motor_of = {
+            official.joint(int(j)).name: i for i, j in enumerate(official.actuator_trnid[:, 0])
+        }
+        for name in robot.posture:
+            i = motors.index(robot.prefix + name)
+            limits = official.actuator(motor_of[name]).ctrlrange
+            np.testing.assert_array_equal(model.actuator(i).ctrlrange, limits)
+            joint = model.joint(robot.prefix + name)
+            np.testing.assert_array_equal(joint.range, official.joint(name).range)
+            assert joint.damping == official.joint(name).damping
 
 
-def robot_bodies(model, robot):
+def based(scene, base):
+    """The scene with all its robots at a base."""
+    return replace(scene, robots=tuple(replace(robot, base=base) for robot in scene.robots))
+
+
+def robot_bodies(model, robot, prefix=""):
     """Mass and, with all joints at 0, position of each of the robot's bodies [kg, m]."""
     data = mujoco.MjData(model)
-    data.qpos[: robot.nq] = 0.0
+    data.qpos[:] = 0.0
     mujoco.mj_kinematics(model, data)
-    bodies = names(robot, "body", robot.nbody)[1:]
+    bodies = [prefix + name for name in names(robot, "body", robot.nbody)[1:]]
     return np.array([[*model.body(b).mass, *data.body(b).xpos] for b in bodies])
 
 
 @each_scenario
 def test_locking_joints_leaves_masses_and_places_at_angle_zero(scene):
-    spec = mujoco.MjSpec.from_file(str(asset_path(scene.robot.model)))
-    robot = spec.compile()
-    at_origin = replace(scene, robot=replace(scene.robot, base=Pose()))
-    model = compose(at_origin, ObjectMotion.POSED).compile()
-    expected = robot_bodies(robot, robot)
-    # The same numbers added up in the same order.
-    np.testing.assert_allclose(robot_bodies(model, robot), expected, rtol=0, atol=1e-14)
-    # A body a millimetre off is caught.
-    spec.bodies[-1].pos[0] += 1e-3
-    assert np.abs(robot_bodies(spec.compile(), robot) - expected).max() > 0.9e-3
+    model = compose(based(scene, Pose()), ObjectMotion.POSED).compile()
+    for robot in scene.robots:
+        spec = mujoco.MjSpec.from_file(str(robot_path(robot.model)))
+        alone = spec.compile()
+        expected = robot_bodies(alone, alone)
+        found = robot_bodies(model, alone, robot.prefix)
+        # The same numbers added up in the same order.
+        np.testing.assert_allclose(found, expected, rtol=0, atol=1e-14)
+        # A body a millimetre off is caught.
+        spec.bodies[-1].pos[0] += 1e-3
+        assert np.abs(robot_bodies(spec.compile(), alone) - expected).max() > 0.9e-3
 
 
 def test_hands_sit_on_their_mounts_and_turn_with_them():
@@ -279,15 +290,15 @@ def test_hands_sit_on_their_mounts_and_turn_with_them():
     for hand in BOX.hands:
         body = model.body(hand_body(hand))
         assert model.body(body.parentid[0]).name == hand.mount
-        np.testing.assert_array_equal(body.pos, 0.0)
-        np.testing.assert_array_equal(body.quat, [1.0, 0.0, 0.0, 0.0])
+        np.testing.assert_array_equal(body.pos, hand.mount_pose.position)
+        np.testing.assert_array_equal(body.quat, hand.mount_pose.quaternion)
         assert model.geom(tip_geom(hand)).bodyid == body.id
         assert model.site(tip_site(hand)).bodyid == body.id
 
 
 def test_base_pose_carries_the_whole_robot_and_nothing_else():
     base = Pose((0.1, -0.2, 0.3), (np.cos(0.2), 0.0, np.sin(0.2), 0.0))
-    moved = compose(replace(BOX, robot=replace(BOX.robot, base=base))).compile()
+    moved = compose(based(BOX, base)).compile()
     model = composed("box-tilt")
     turn = Rotation.from_quat(base.quaternion, scalar_first=True).as_matrix()
     here, there = mujoco.MjData(model), mujoco.MjData(moved)
@@ -304,5 +315,5 @@ def test_base_pose_carries_the_whole_robot_and_nothing_else():
 def test_a_posed_object_has_no_joint_and_no_contacts():
     model = compose(BOX, ObjectMotion.POSED).compile()
     assert model.body("box").mocapid[0] == 0
-    assert model.njnt == len(BOX.robot.posture)
+    assert model.njnt == len(BOX.posture)
     assert model.npair == 0

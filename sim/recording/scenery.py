@@ -3,16 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import replace
 
 import mujoco
 import numpy as np
 import rerun as rr
+from scipy.spatial.transform import Rotation
 
-from assets import description_path
-from assets.visuals import Visual, load_visuals
+from assets import ROBOTS, description_path
+from assets.visuals import Visual, link_names, load_visuals
 from sim.recording.blueprint import TIMELINE
 from sim.recording.columns import poses
-from sim.scenario import Scenario
+from sim.scenario import Robot, Scenario
 from sim.scene import ObjectMotion, compose, hand_body
 from sim.trace import Trace
 from synthesis.contact import Array
@@ -32,7 +34,10 @@ class Scenery:
         self._data = mujoco.MjData(self._model)
         self._q = np.array([int(self._model.joint(name).qposadr[0]) for name in joints])
         self._object = int(self._model.body(scenario.object.name).mocapid[0])
-        self._visuals = self._load_visuals()
+        self._visuals: list[Visual] = []
+        self._dressed: set[str] = set()  # bodies of robots that have meshes
+        for robot in scenario.robots:
+            self._dress(robot)
         shown = {self._model.body(visual.link).id for visual in self._visuals}
         shown |= {int(self._model.geom_bodyid[g]) for g in self._primitives()}
         bodies = np.array(sorted(shown))
@@ -40,23 +45,30 @@ class Scenery:
         self._moving, self._fixed = bodies[moves], bodies[~moves]
         self._frames = [f"tf#/{self._path(body)}" for body in self._moving]
 
-    def _load_visuals(self) -> list[Visual]:
-        if self._scenario.robot.description is None:
-            return []
+    def _dress(self, robot: Robot) -> None:
+        """Takes over the meshes of a robot that has some."""
+        description = ROBOTS.get(robot.model)
+        if description is None:
+            return
+        urdf = description_path(description).read_text()
         names = {self._model.body(b).name for b in range(self._model.nbody)}
-        urdf = description_path(self._scenario.robot.description).read_text()
-        return load_visuals(urdf, names)
+        links = {link for link in link_names(urdf) if robot.prefix + link in names}
+        self._dressed |= {robot.prefix + link for link in links}
+        visuals = load_visuals(urdf, links)
+        self._visuals += [replace(v, link=robot.prefix + v.link) for v in visuals]
 
     def _primitives(self) -> Iterator[int]:
-        """Visible geoms; the robot's own collision primitives only where it has no meshes."""
+        """Visible geoms; a robot's own collision primitives only where it has no meshes."""
         scenario = self._scenario
         own = {g.name for g in (*scenario.object.geoms, *scenario.environment)}
         hands = {self._model.body(hand_body(hand)).id for hand in scenario.hands}
         for g in range(self._model.ngeom):
             if self._model.geom_rgba[g, 3] == 0.0:
                 continue
-            is_own = self._model.geom(g).name in own or int(self._model.geom_bodyid[g]) in hands
-            if is_own or (not self._visuals and self._model.geom_group[g] == 0):
+            body = int(self._model.geom_bodyid[g])
+            is_own = self._model.geom(g).name in own or body in hands
+            is_bare = self._model.body(body).name not in self._dressed
+            if is_own or (is_bare and self._model.geom_group[g] == 0):
                 yield g
 
     def log_shapes(self, recording: rr.RecordingStream) -> None:
@@ -117,6 +129,8 @@ def _transform(X: Array) -> rr.Transform3D:
 def _shape(model: mujoco.MjModel, g: int) -> rr.AsComponents:
     geom = model.geom(g)
     size = geom.size
+    if geom.type[0] == mujoco.mjtGeom.mjGEOM_MESH:
+        return _mesh(model, g)
     placed = {
         "centers": [geom.pos],
         "quaternions": [rr.Quaternion(xyzw=np.roll(geom.quat, -1))],
@@ -139,3 +153,19 @@ def _shape(model: mujoco.MjModel, g: int) -> rr.AsComponents:
         case _:
             half = [x or _PLANE_SIZE / 2 for x in size[:2]]
             return rr.Boxes3D(half_sizes=[[*half, _PLANE_THICKNESS / 2]], **placed)
+
+
+def _mesh(model: mujoco.MjModel, g: int) -> rr.AsComponents:
+    """A mesh geom in its body's frame, with flat faces."""
+    geom, mesh = model.geom(g), model.mesh(int(model.geom_dataid[g]))
+    vertices = slice(int(mesh.vertadr[0]), int(mesh.vertadr[0] + mesh.vertnum[0]))
+    faces = slice(int(mesh.faceadr[0]), int(mesh.faceadr[0] + mesh.facenum[0]))
+    turned = Rotation.from_quat(geom.quat, scalar_first=True).apply(model.mesh_vert[vertices])
+    corners = (geom.pos + turned)[model.mesh_face[faces]]
+    normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), np.finfo(float).tiny)
+    return rr.Mesh3D(
+        vertex_positions=corners.reshape(-1, 3).astype(np.float32),
+        vertex_normals=np.repeat(normals, 3, axis=0).astype(np.float32),
+        albedo_factor=(255 * geom.rgba).astype(np.uint8),
+    )
