@@ -13,10 +13,11 @@ from scipy.interpolate import CubicSpline
 from scipy.spatial.transform import Rotation
 
 from assets import velocity_limits
+from sim.collisions import DETECTION, collision_pairs, distance
 from sim.contacts import ContactFrames
 from sim.path import ScrewPath
 from sim.scenario import Scenario
-from sim.scene import ObjectMotion, compose, tip_geom, tip_site, unwanted_pairs
+from sim.scene import ObjectMotion, compose, tip_geom, tip_site
 from sim.schedule import Schedule
 from synthesis import FulcrumError, InvalidInputError
 from synthesis.contact import Array
@@ -29,8 +30,6 @@ _DAMPING = 1e-8
 # Longest step of a joint while the start is sought [rad or m]: longer ones leave the region where
 # the task is linear, and an arm that is out of reach ends far from it, at limits of no concern.
 _START_STEP = 0.05
-# From where links look out for each other and for the scene [m].
-_DETECTION = 0.05
 # How near to a limit counts as being at it [rad, m, or share of the speed limit].
 _AT_LIMIT = 1e-3
 _NAMED_COLLISIONS = 3
@@ -128,9 +127,7 @@ class JointPath:
         raise InvalidInputError("tilt", given, f"between 0 and {np.degrees(end):g} deg")
 
 
-def plan_joints(
-    scenario: Scenario, solved: float = _SOLVED, grid: Grid | None = None
-) -> JointPath:
+def plan_joints(scenario: Scenario, solved: float = _SOLVED, grid: Grid | None = None) -> JointPath:
     """Follows the manoeuvre with all hands, within joint, speed and collision limits.
 
     Args:
@@ -179,9 +176,9 @@ class _Follower:
         self._pose_object(0.0)
         self._collisions = mink.CollisionAvoidanceLimit(
             model,
-            self._collision_pairs(),
+            collision_pairs(scenario, model, self._configuration.data),
             minimum_distance_from_collisions=grid.clearance_m,
-            collision_detection_distance=_DETECTION,
+            collision_detection_distance=DETECTION,
         )
 
     def follow(self) -> JointPath:
@@ -279,7 +276,7 @@ class _Follower:
         )
 
     def _reasons(self, too_fast: Array) -> list[str]:
-        model, q = self._model, self._configuration.q
+        model, data, q = self._model, self._configuration.data, self._configuration.q
         reasons = []
         for j in range(model.njnt):
             name, (low, high) = model.joint(j).name, model.jnt_range[j]
@@ -291,9 +288,9 @@ class _Follower:
             if high - q[j] < _AT_LIMIT:
                 reasons.append(f"{name} at its upper limit {high:.3f} {unit}")
         near = sorted(
-            (distance, first, second)
+            (apart, first, second)
             for first, second in self._collisions.geom_id_pairs
-            if (distance := self._distance(first, second)) < self._grid.clearance_m + _AT_LIMIT
+            if (apart := distance(model, data, first, second)) < self._grid.clearance_m + _AT_LIMIT
         )
         reasons += [
             f"{model.geom(first).name} within {self._grid.clearance_m * 1e3:g} mm of {model.geom(second).name}"
@@ -301,47 +298,9 @@ class _Follower:
         ]
         return reasons or ["out of reach of the arms"]
 
-    def _distance(self, first: int, second: int) -> float:
-        data = self._configuration.data
-        return mujoco.mj_geomDistance(self._model, data, first, second, _DETECTION, None)
-
     def _pose_object(self, tilt: float) -> None:
         R_WO, p_WO = self._path.pose(tilt)
         data = self._configuration.data
         data.mocap_pos[self._object] = p_WO
         data.mocap_quat[self._object] = Rotation.from_matrix(R_WO).as_quat(scalar_first=True)
         self._configuration.update()
-
-    def _collision_pairs(self) -> list[tuple[list[str], list[str]]]:
-        """Links against links, object and environment; not the tips against what they touch.
-
-        Left out, as the collision primitives of joint housings overlap by construction: link
-        pairs with at most three joints between them, and those that overlap in the start posture.
-        """
-        model, scenario = self._model, self._scenario
-        surroundings = [g.name for g in (*scenario.object.geoms, *scenario.environment)]
-        names = [model.geom(g).name for g in range(model.ngeom)]
-        links = [name for name in names if name not in surroundings]
-        moving = [name for name in links if model.body_weldid[model.geom(name).bodyid[0]] != 0]
-        pairs = [([link], [other]) for link, other in unwanted_pairs(scenario, model)]
-        for i, link in enumerate(moving):
-            for other in (*moving[i + 1 :], *(name for name in links if name not in moving)):
-                first, second = model.geom(link), model.geom(other)
-                if not self._near_in_chain(first.bodyid[0], second.bodyid[0]) and (
-                    self._distance(first.id, second.id) > 0.0
-                ):
-                    pairs.append(([link], [other]))
-        return pairs
-
-    def _near_in_chain(self, first: int, second: int) -> bool:
-        """Whether at most three joints lie between two bodies of one chain."""
-        a, b = self._ancestors(first), self._ancestors(second)
-        return a[0] in b or b[0] in a
-
-    def _ancestors(self, body: int) -> list[int]:
-        """The body and the next three that a joint carries it on, each by its weld group."""
-        weld, parent = self._model.body_weldid, self._model.body_parentid
-        chain = [int(weld[body])]
-        for _ in range(3):
-            chain.append(int(weld[parent[chain[-1]]]))
-        return chain

@@ -3,63 +3,64 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, replace
 
+import mujoco
 import numpy as np
 from scipy.spatial.transform import Rotation
 
 from sim.contacts import contact_axes
 from sim.path import rotation
-from sim.placement_face import Face, face_of
-from sim.placement_mirror import Mirror, chains, find_mirror
-from sim.scenario import Hand, Pose, Scenario, Vector
+from sim.placement_face import Range, faces_of, moved, shape_of
+from sim.placement_mirror import chains, find_mirror
+from sim.scenario import Hand, Pose, Robot, Scenario
 from sim.scene import compose
+from sim.shape import triple
 from synthesis import InvalidInputError
 from synthesis.contact import Array
 
-Range = tuple[float, float]
-
-_FIXED = (0.0, 0.0)
+_FIXED: Range = (0.0, 0.0)
+_RANGES = ("x", "y", "height", "yaw_deg", "turn_deg", "posture_deg")
 # Start angles keep this share of their joint's range clear of its ends [-].
 _RANGE_LEFT = 0.05
+# Digits of metres and of degrees: what is written down is what was tried.
+_DIGITS_M, _DIGITS_DEG = 4, 2
 
 
 @dataclass(frozen=True)
 class Freedom:
     """How far from where it is everything may move; a range from 0 to 0 leaves it there.
 
-    A scene with two hands that mirror each other stays its own mirror image: the robot then moves
+    A scene with two hands that mirror each other stays its own mirror image: the robots then move
     in the mirror plane alone, and neither sideways nor in yaw.
 
     Attributes:
-        x, y: Of the robot's base along the world's axes [m].
-        height: Of the base [m].
-        yaw_deg: Of the base about the vertical through the path's point [deg].
-        faces: Names of the hands whose contacts may move all over the face they are on; None for
-            all hands.
-        border: Distance that contacts keep from the ends of their face [m].
+        x, y: Of the robots' bases, all together, along the world's axes [m].
+        height: Of the bases [m].
+        yaw_deg: Of the bases about the vertical through the path's point [deg].
+        faces: Faces of the object that hands may touch beside the one where they are, by hand;
+            hands left out stay where they are. None for all hands, each on its present face.
+        border: Distance that contacts keep from the ends of their faces [m].
         turn_deg: Of the hands about their contact normals [deg].
-        posture: Of the start angles of revolute joints, from which inverse kinematics seeks [rad].
+        posture_deg: Of the start angles of revolute joints, from which inverse kinematics seeks
+            [deg].
     """
 
     x: Range = (-0.3, 0.3)
     y: Range = (-0.3, 0.3)
     height: Range = _FIXED
     yaw_deg: Range = (-60.0, 60.0)
-    faces: tuple[str, ...] | None = None
+    faces: dict[str, tuple[str, ...]] | None = None
     border: float = 0.02
     turn_deg: Range = (-90.0, 90.0)
-    posture: Range = (-1.0, 1.0)
+    posture_deg: Range = (-60.0, 60.0)
 
     def __post_init__(self) -> None:
-        for field in fields(self):
-            if field.name in ("faces", "border"):
-                continue
-            low, high = getattr(self, field.name)
+        for name in _RANGES:
+            low, high = getattr(self, name)
             if not (math.isfinite(low) and math.isfinite(high) and low <= 0.0 <= high):
                 valid = "a finite range that contains 0"
-                raise InvalidInputError(f"freedom.{field.name}", (low, high), valid)
+                raise InvalidInputError(f"freedom.{name}", (low, high), valid)
         if not (math.isfinite(self.border) and self.border >= 0.0):
             raise InvalidInputError("freedom.border", self.border, "a finite distance >= 0 m")
 
@@ -92,52 +93,60 @@ class Moves:
         """
         self._scenario = scenario
         self.mirror = find_mirror(scenario)
-        self._joints = _joint_ranges(scenario, freedom.posture)
-        self._variables = self._base(freedom)
         names = [hand.name for hand in scenario.hands]
-        for name in freedom.faces or ():
+        allowed = dict.fromkeys(names, ()) if freedom.faces is None else freedom.faces
+        for name in allowed:
             if name not in names:
                 raise InvalidInputError("freedom.faces", name, f"of {', '.join(names)}")
-        self._moving = names if freedom.faces is None else list(freedom.faces)
-        self._faces: dict[str, Face] = {}
         followers = () if self.mirror is None else (self.mirror.hands[1].name,)
         self._leaders = [hand for hand in scenario.hands if hand.name not in followers]
+        self._faces = {
+            hand.name: faces_of(scenario, hand, allowed[hand.name], freedom.border)
+            for hand in self._leaders
+            if hand.name in allowed
+        }
+        variables = self._of_bases(freedom)
         for hand in self._leaders:
-            self._variables += self._of_hand(hand, freedom)
-        self._variables += self._of_posture()
-        self._variables = [v for v in self._variables if v.high > v.low]
-        if not self._variables:
-            raise InvalidInputError("freedom", freedom, "a freedom with something that may move")
-        self.names = tuple(v.name for v in self._variables)
-        self._low = np.array([v.low for v in self._variables])
-        self._high = np.array([v.high for v in self._variables])
-        now = np.array([v.now for v in self._variables])
-        self.start = (now - self._low) / (self._high - self._low)
-
-    def values(self, x: Array) -> dict[str, float]:
-        """Values of the variables [m, deg or rad] by name, at x in [0, 1], (d,)."""
-        values = self._low + np.clip(x, 0.0, 1.0) * (self._high - self._low)
-        return dict(zip(self.names, values.tolist(), strict=True))
+            variables += self._of_hand(hand, freedom)
+        self._joints = _joint_ranges(scenario, freedom.posture_deg)
+        if self.mirror is not None:
+            for image, _ in self.mirror.joints.values():
+                self._joints.pop(image, None)
+        now = scenario.posture
+        variables += [
+            _Variable(f"posture {joint}", *ends, math.degrees(now[joint]))
+            for joint, ends in self._joints.items()
+        ]
+        variables = [v for v in variables if v.high > v.low]
+        if not variables:
+            raise InvalidInputError("freedom", freedom, "one with something that may move")
+        self.names = tuple(v.name for v in variables)
+        self._low = np.array([v.low for v in variables])
+        self._high = np.array([v.high for v in variables])
+        self.start = (np.array([v.now for v in variables]) - self._low) / (self._high - self._low)
 
     def scenario(self, x: Array) -> Scenario:
         """The scenario at x in [0, 1], (d,)."""
-        values = self.values(x)
-        moved = _moved(self._scenario, values)
-        hands = {hand.name: hand for hand in moved.hands}
-        posture = dict(moved.robot.posture)
+        values = self._low + np.clip(x, 0.0, 1.0) * (self._high - self._low)
+        named = dict(zip(self.names, values.tolist(), strict=True))
+        hands = {hand.name: hand for hand in self._scenario.hands}
         for hand in self._leaders:
-            hands[hand.name] = self._held(hand, values)
-        for joint in self._joints:
-            posture[joint] = values.get(f"posture {joint}", posture[joint])
+            hands[hand.name] = self._held(hand, named)
+        posture = {
+            joint: rounded(math.radians(named[f"posture {joint}"]))
+            for joint in self._joints
+            if f"posture {joint}" in named
+        }
         if self.mirror is not None:
             first, second = self.mirror.hands
-            hands[second.name] = self._image(second, hands[first.name], values)
+            hands[second.name] = self._image(second, hands[first.name])
             for joint, (image, sign) in self.mirror.joints.items():
-                posture[image] = sign * posture[joint]
-        robot = replace(moved.robot, posture=posture)
-        return replace(moved, robot=robot, hands=tuple(hands.values()))
+                posture[image] = sign * posture.get(joint, self._scenario.posture[joint])
+        robots = tuple(_based(robot, self._scenario, named) for robot in self._scenario.robots)
+        placed = replace(self._scenario, robots=robots, hands=tuple(hands.values()))
+        return with_posture(placed, posture)
 
-    def _base(self, freedom: Freedom) -> list[_Variable]:
+    def _of_bases(self, freedom: Freedom) -> list[_Variable]:
         variables = [
             _Variable("base x", *freedom.x),
             _Variable("base y", *freedom.y),
@@ -150,82 +159,84 @@ class Moves:
         return [v for v in variables if v.name not in (across, "base yaw")]
 
     def _of_hand(self, hand: Hand, freedom: Freedom) -> list[_Variable]:
-        variables = []
-        if hand.name in self._moving:
-            face = face_of(self._scenario, hand, freedom.border)
-            self._faces[hand.name] = face
-            now = face.coordinates(hand.p_OC_O)
-            variables += [
-                _Variable(f"{hand.name} {axis}", *ends, at)
-                for axis, ends, at in zip("uv", face.ranges, now, strict=True)
-            ]
-        return [*variables, _Variable(f"{hand.name} turn", *freedom.turn_deg)]
-
-    def _of_posture(self) -> list[_Variable]:
-        images = set()
-        if self.mirror is not None:
-            images = {image for image, _ in self.mirror.joints.values()}
-        return [
-            _Variable(f"posture {joint}", *ends, self._scenario.robot.posture[joint])
-            for joint, ends in self._joints.items()
-            if joint not in images
+        variables = [_Variable(f"{hand.name} turn", *freedom.turn_deg)]
+        faces = self._faces.get(hand.name)
+        if faces is None:
+            return variables
+        places = [
+            (f"{hand.name} {axis}", share) for axis, share in zip("uv", faces.shares, strict=True)
         ]
+        variables += [_Variable(name, 0.0, 1.0, share) for name, share in places]
+        if len(faces.names) > 1:
+            variables.append(_Variable(f"{hand.name} face", 0.0, 1.0))
+        return variables
 
     def _held(self, hand: Hand, values: dict[str, float]) -> Hand:
-        """A hand on its own face, turned about its normal."""
-        face = self._faces.get(hand.name)
-        if face is not None:
-            u, v = (values.get(f"{hand.name} {axis}") for axis in "uv")
-            now = face.coordinates(hand.p_OC_O)
-            p, normal = face.place(now[0] if u is None else u, now[1] if v is None else v)
-            hand = replace(hand, p_OC_O=p, normal_O=normal)
-        return _turned(hand, values.get(f"{hand.name} turn", 0.0))
+        """A hand on one of its faces, turned about its normal."""
+        name, faces = hand.name, self._faces.get(hand.name)
+        if faces is not None:
+            face = values.get(f"{name} face", 0.0)
+            hand = faces.held(face, values[f"{name} u"], values[f"{name} v"])
+        degrees = round(values.get(f"{name} turn", 0.0), _DIGITS_DEG)
+        if not degrees:
+            return hand
+        angle = math.radians(degrees)
+        axes = contact_axes(hand.normal_O, hand.tangent_O)
+        return replace(hand, tangent_O=triple(axes @ [math.cos(angle), math.sin(angle), 0.0]))
 
-    def _image(self, hand: Hand, first: Hand, values: dict[str, float]) -> Hand:
-        """The second hand as the image of the first."""
+    def _image(self, second: Hand, first: Hand) -> Hand:
+        """The second hand as the image of the first, with the tangent that it has by its own."""
         assert self.mirror is not None
-        normal = self.mirror.direction(first.normal_O)
-        moved = replace(hand, p_OC_O=self.mirror.point(first.p_OC_O), normal_O=normal)
-        return _turned(moved, -values.get(f"{first.name} turn", 0.0))
+        mirrored = self.mirror.direction
+        own = self.mirror.hands[0]
+        # Which of the image's two tangents its own hand began with.
+        sign = math.copysign(1.0, np.dot(mirrored(own.tangent_O), second.tangent_O))
+        tangent = triple(sign * np.array(mirrored(first.tangent_O)))
+        if first.p_OC_O == own.p_OC_O:
+            return replace(second, tangent_O=tangent)
+        point, normal = self.mirror.point(first.p_OC_O), mirrored(first.normal_O)
+        held = moved(second, point, normal, shape_of(self._scenario))
+        return replace(held, tangent_O=tangent)
 
 
-def _joint_ranges(scenario: Scenario, posture: Range) -> dict[str, Range]:
-    """Ranges of the start angles that may be chosen, by revolute joint that carries a hand."""
+def rounded(angle: float) -> float:
+    """An angle [rad] that is a number of degrees with few digits."""
+    return math.radians(round(math.degrees(angle), _DIGITS_DEG))
+
+
+def with_posture(scenario: Scenario, posture: dict[str, float]) -> Scenario:
+    """The scenario with other start angles [rad or m] of some joints, by their scene names."""
+    robots = []
+    for robot in scenario.robots:
+        own = {joint: posture.get(robot.prefix + joint, q) for joint, q in robot.posture.items()}
+        robots.append(replace(robot, posture=own))
+    return replace(scenario, robots=tuple(robots))
+
+
+def _joint_ranges(scenario: Scenario, around_deg: Range) -> dict[str, Range]:
+    """Ranges of the start angles that may be chosen [deg], by joint that carries a hand."""
     scene = compose(scenario).compile()
     ranges = {}
-    for joint in dict.fromkeys(j for chain in chains(scene, scenario).values() for j in chain):
-        known = scene.joint(joint)
-        if known.type[0] != 3 or joint in scenario.robot.still:  # mjJNT_HINGE
+    for name in dict.fromkeys(j for chain in chains(scene, scenario).values() for j in chain):
+        joint = scene.joint(name)
+        if joint.type[0] != mujoco.mjtJoint.mjJNT_HINGE or name in scenario.still:
             continue
-        angle, (low, high) = scenario.robot.posture[joint], known.range.tolist()
-        room = _RANGE_LEFT * (high - low)
-        if not known.limited[0]:
-            low, high, room = -math.pi, math.pi, 0.0
-        ends = max(low + room, angle + posture[0]), min(high - room, angle + posture[1])
-        ranges[joint] = (min(ends[0], angle), max(ends[1], angle))
+        low, high = np.degrees(joint.range).tolist() if joint.limited[0] else (-180.0, 180.0)
+        angle, room = math.degrees(scenario.posture[name]), _RANGE_LEFT * (high - low)
+        ends = max(low + room, angle + around_deg[0]), min(high - room, angle + around_deg[1])
+        ranges[name] = (min(ends[0], angle), max(ends[1], angle))
     return ranges
 
 
-def _moved(scenario: Scenario, values: dict[str, float]) -> Scenario:
-    """The scenario with the robot's base elsewhere."""
-    shift = np.array([values.get(f"base {axis}", 0.0) for axis in ("x", "y", "height")])
-    turn = Rotation.from_rotvec([0.0, 0.0, math.radians(values.get("base yaw", 0.0))])
-    base = scenario.robot.base
-    point = np.asarray(scenario.path.point_W, float)
-    position = point + turn.apply(np.asarray(base.position) - point) + shift
-    quaternion = (turn * rotation(base)).as_quat(scalar_first=True)
-    if not values.get("base yaw", 0.0):
-        quaternion = np.asarray(base.quaternion)
-    x, y, z = position.tolist()
-    q_w, q_x, q_y, q_z = quaternion.tolist()
-    moved = Pose((x, y, z), (q_w, q_x, q_y, q_z))
-    return replace(scenario, robot=replace(scenario.robot, base=moved))
-
-
-def _turned(hand: Hand, degrees: float) -> Hand:
-    """A hand turned about its contact normal."""
-    axes = contact_axes(hand.normal_O, hand.tangent_O)
-    angle = math.radians(degrees)
-    x, y, z = (axes @ [math.cos(angle), math.sin(angle), 0.0]).tolist()
-    tangent: Vector = (x, y, z)
-    return replace(hand, tangent_O=tangent) if degrees else hand
+def _based(robot: Robot, scenario: Scenario, values: dict[str, float]) -> Robot:
+    """A robot with its base elsewhere."""
+    moves = [round(values.get(f"base {axis}", 0.0), _DIGITS_M) for axis in ("x", "y", "height")]
+    degrees = round(values.get("base yaw", 0.0), _DIGITS_DEG)
+    base, point = robot.base, np.asarray(scenario.path.point_W, float)
+    if not degrees:
+        position = triple(np.array(base.position, float) + moves)
+        return replace(robot, base=Pose(position, base.quaternion))
+    turn = Rotation.from_rotvec([0.0, 0.0, math.radians(degrees)])
+    position = triple(point + turn.apply(np.asarray(base.position) - point) + moves)
+    w, x, y, z = (turn * rotation(base)).as_quat(scalar_first=True).tolist()
+    return replace(robot, base=Pose(position, (w, x, y, z)))

@@ -1,4 +1,4 @@
-"""Whether a scene is its own mirror image: two hands face to face, on chains that mirror each other."""
+"""Whether a scene is its own mirror image: two hands face to face, on chains that mirror."""
 
 from __future__ import annotations
 
@@ -50,7 +50,8 @@ def chains(scene: mujoco.MjModel, scenario: Scenario) -> dict[str, tuple[str, ..
     """Names of the driven joints that carry each hand, from the root, by hand."""
     found = {}
     for hand in scenario.hands:
-        body, names = int(scene.body(hand_body(hand)).id), []
+        names: list[str] = []
+        body = int(scene.body(hand_body(hand)).id)
         while body:
             first, count = int(scene.body_jntadr[body]), int(scene.body_jntnum[body])
             names = [scene.joint(j).name for j in range(first, first + count)] + names

@@ -10,9 +10,12 @@ import mujoco
 import numpy as np
 from scipy.spatial.transform import Rotation
 
+from sim.collisions import Names, distance, overlapping_links
 from sim.ik import Grid, PathError, plan_joints
 from sim.path import ScrewPath
+from sim.placement_freedom import rounded, with_posture
 from sim.poses import PathProblems
+from sim.robot import RobotModel
 from sim.scenario import Scenario
 from sim.scene import ObjectMotion, compose
 from sim.settings import Control
@@ -57,8 +60,8 @@ FULL = Steps(Grid(), solved=1e-9, tilt_deg=5.0)
 _OVERLAPS, _OUT_OF_REACH, _STUCK, _WITHOUT_FORCES = 4.0, 3.0, 2.0, 1.0
 # Feasible placements cost less than this.
 _FEASIBLE = 0.999
-# Clearance of the robot's fixed parts, and from where distances count [m].
-_CLEARANCE, _DETECTION = 0.005, 0.05
+# Clearance of the robots' fixed parts [m].
+CLEARANCE = 0.005
 # Tilts at which the object's distance to them is taken.
 _LOOKS = 7
 
@@ -95,7 +98,7 @@ def assess(
     control: Control,
     goal: Goal,
     steps: Steps = FULL,
-    tolerated: frozenset[tuple[str, str]] = frozenset(),
+    tolerated: frozenset[Names] = frozenset(),
     whole: bool = True,
 ) -> Value:
     """What a placement is worth.
@@ -106,13 +109,14 @@ def assess(
             least friction of its uncertainty set, and its preload.
         goal: What the cost is.
         steps: How closely it is looked at.
-        tolerated: Geoms of fixed parts of the robot and of what surrounds it that may overlap.
+        tolerated: Pairs of geoms that may touch at the start (see :func:`touching`).
         whole: Whether all numbers are asked for, or the goal's alone.
     """
-    depth, pair = _overlap(scenario, tolerated)
-    if depth > 0.0:
-        reason = f"{pair[0]} within {1e3 * _CLEARANCE:g} mm of {pair[1]}"
-        return Value(_OVERLAPS + depth / (1.0 + depth), reason)
+    depths = {pair: d for pair, d in _depths(scenario).items() if pair not in tolerated}
+    if depths and max(depths.values()) > 0.0:
+        worst = max(depths, key=lambda pair: depths[pair])
+        cost = _OVERLAPS + depths[worst] / (1.0 + depths[worst])
+        return Value(cost, f"{worst[0]} within {1e3 * CLEARANCE:g} mm of {worst[1]} at the start")
     try:
         joint_path = plan_joints(scenario, steps.solved, steps.grid)
     except PathError as error:
@@ -128,11 +132,11 @@ def assess(
     clearance = float(joint_path.clearance.min())
     lacks = [_lack(weight, *span) for span in spans]
     if any(lacks):
-        worst = int(np.argmax(lacks))
-        low, high = spans[worst]
-        reason = f"at {tilts[worst]:.0f} deg forces hold {low:.4g} to {high:.4g} N"
+        at = int(np.argmax(lacks))
+        low, high = spans[at]
+        reason = f"at {tilts[at]:.0f} deg forces hold {low:.4g} to {high:.4g} N"
         if not high:
-            reason = f"at {tilts[worst]:.0f} deg no forces hold any weight"
+            reason = f"at {tilts[at]:.0f} deg no forces hold any weight"
         cost = _WITHOUT_FORCES + float(np.mean(lacks))
         return Value(cost, reason, heaviest, clearance=clearance)
 
@@ -166,47 +170,52 @@ def believed(control: Control, scenario: Scenario) -> Control:
     )
 
 
-def touching(scenario: Scenario) -> frozenset[tuple[str, str]]:
-    """Fixed parts of the robot that touch what surrounds it as it stands: they were put there."""
+def settled(scenario: Scenario) -> Scenario:
+    """The scenario with the start posture in which its hands hold the object at the start.
+
+    Raises:
+        PathError: The arms cannot follow the path.
+    """
+    joints = RobotModel(scenario).joints
+    q = plan_joints(scenario).holding(0.0).tolist()
+    return with_posture(scenario, dict(zip(joints, map(rounded, q), strict=True)))
+
+
+def touching(scenario: Scenario) -> frozenset[Names]:
+    """What touches as the scenario stands, and so may: see :func:`assess`."""
     return frozenset(pair for pair, depth in _depths(scenario).items() if depth > 0.0)
 
 
-def _overlap(
-    scenario: Scenario, tolerated: frozenset[tuple[str, str]]
-) -> tuple[float, tuple[str, str]]:
-    """How far fixed parts of the robot are within the clearance of others [m], and which most."""
-    depths = {p: d for p, d in _depths(scenario).items() if p not in tolerated}
-    if not depths:
-        return 0.0, ("", "")
-    worst = max(depths, key=lambda pair: depths[pair])
-    return depths[worst], worst
+def _depths(scenario: Scenario) -> dict[Names, float]:
+    """How far parts of the robots are where they should not be, at the start [m], by pair.
 
-
-def _depths(scenario: Scenario) -> dict[tuple[str, str], float]:
-    """How far each fixed part is within the clearance of object and environment [m]."""
+    That is: fixed parts within the clearance of object or environment anywhere on the path, and
+    links that overlap in the start posture, for which inverse kinematics does not look out.
+    """
     model = compose(scenario, ObjectMotion.POSED).compile()
     data = mujoco.MjData(model)
-    solid = [g for g in (*scenario.object.geoms, *scenario.environment) if g.solid]
-    around = [g.name for g in (*scenario.object.geoms, *scenario.environment)]
+    data.qpos[:] = [scenario.posture[model.joint(j).name] for j in range(model.njnt)]
+    around = (*scenario.object.geoms, *scenario.environment)
+    solid = [model.geom(g.name).id for g in around if g.solid]
+    names = [g.name for g in around]
     fixed = [
         g
         for g in range(model.ngeom)
-        if model.body_weldid[model.geom_bodyid[g]] == 0 and model.geom(g).name not in around
+        if model.body_weldid[model.geom_bodyid[g]] == 0 and model.geom(g).name not in names
     ]
     path, thing = ScrewPath(scenario.path), model.body(scenario.object.name).mocapid[0]
-    depths: dict[tuple[str, str], float] = {}
+    depths: dict[Names, float] = {}
     for tilt in np.linspace(0.0, path.end, _LOOKS):
         R_WO, data.mocap_pos[thing] = path.pose(float(tilt))
         data.mocap_quat[thing] = Rotation.from_matrix(R_WO).as_quat(scalar_first=True)
         mujoco.mj_kinematics(model, data)
         for g in fixed:
             for other in solid:
-                near = mujoco.mj_geomDistance(
-                    model, data, g, model.geom(other.name).id, _DETECTION, None
-                )
-                pair = model.geom(g).name, other.name
-                depths[pair] = max(depths.get(pair, 0.0), _CLEARANCE - near)
-    return depths
+                pair = model.geom(g).name, model.geom(other).name
+                depth = CLEARANCE - distance(model, data, g, other)
+                depths[pair] = max(depths.get(pair, 0.0), depth)
+    links = overlapping_links(scenario, model, data)
+    return depths | {pair: max(depth, 0.0) + CLEARANCE for pair, depth in links.items()}
 
 
 def _span(problems: PathProblems, tilt: float, synthesizer: Synthesizer) -> tuple[float, float]:
