@@ -52,19 +52,17 @@ def _between_links(
     names = [model.geom(g).name for g in range(model.ngeom)]
     links = [name for name in names if name not in surroundings]
     moving = [name for name in links if model.body_weldid[model.geom(name).bodyid[0]] != 0]
+    fixed = [name for name in links if name not in moving]
+    ids = {name: model.geom(name).id for name in links}
+    chains = {name: _ancestors(model, model.geom_bodyid[g]) for name, g in ids.items()}
     pairs = []
     for i, link in enumerate(moving):
-        for other in (*moving[i + 1 :], *(name for name in links if name not in moving)):
-            first, second = model.geom(link), model.geom(other)
-            if not _near_in_chain(model, first.bodyid[0], second.bodyid[0]):
-                pairs.append(((link, other), distance(model, data, first.id, second.id)))
+        for other in (*moving[i + 1 :], *fixed):
+            # At most three joints lie between two bodies of one chain.
+            near = chains[link][0] in chains[other] or chains[other][0] in chains[link]
+            if not near:
+                pairs.append(((link, other), distance(model, data, ids[link], ids[other])))
     return pairs
-
-
-def _near_in_chain(model: mujoco.MjModel, first: int, second: int) -> bool:
-    """Whether at most three joints lie between two bodies of one chain."""
-    a, b = _ancestors(model, first), _ancestors(model, second)
-    return a[0] in b or b[0] in a
 
 
 def _ancestors(model: mujoco.MjModel, body: int) -> list[int]:

@@ -287,13 +287,14 @@ class _Follower:
                 reasons.append(f"{name} at its lower limit {low:.3f} {unit}")
             if high - q[j] < _AT_LIMIT:
                 reasons.append(f"{name} at its upper limit {high:.3f} {unit}")
+        near_m = self._grid.clearance_m
         near = sorted(
             (apart, first, second)
             for first, second in self._collisions.geom_id_pairs
-            if (apart := distance(model, data, first, second)) < self._grid.clearance_m + _AT_LIMIT
+            if (apart := distance(model, data, first, second)) < near_m + _AT_LIMIT
         )
         reasons += [
-            f"{model.geom(first).name} within {self._grid.clearance_m * 1e3:g} mm of {model.geom(second).name}"
+            f"{model.geom(first).name} within {1e3 * near_m:g} mm of {model.geom(second).name}"
             for _, first, second in near[:_NAMED_COLLISIONS]
         ]
         return reasons or ["out of reach of the arms"]

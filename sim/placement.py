@@ -66,7 +66,7 @@ class Effort:
         workers: Processes; 1 is the present one.
     """
 
-    evaluations: int = 800
+    evaluations: int = 600
     seconds: float = 120.0
     seed: int = 0
     workers: int = 2

@@ -46,8 +46,8 @@ class Freedom:
             [deg].
     """
 
-    x: Range = (-0.3, 0.3)
-    y: Range = (-0.3, 0.3)
+    x: Range = (-0.4, 0.4)
+    y: Range = (-0.4, 0.4)
     height: Range = _FIXED
     yaw_deg: Range = (-60.0, 60.0)
     faces: dict[str, tuple[str, ...]] | None = None

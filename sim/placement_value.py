@@ -44,20 +44,22 @@ class Steps:
         grid: Steps of the joint path.
         solved: Pose error at which one of them counts as solved [m and rad].
         tilt_deg: Step between the tilts at which forces are sought [deg].
+        room: Of its range that every joint keeps clear of its limits [-].
     """
 
     grid: Grid
     solved: float
     tilt_deg: float
+    room: float
 
 
 # A cubic spline through the coarse steps is off by some 0.1 mm between them; the forces are sought
 # at the steps themselves. What is kept clear of between them is kept farther from.
-COARSE = Steps(Grid(15.0, gap_m=0.03, least=1, clearance_m=0.01), solved=1e-5, tilt_deg=15.0)
-FULL = Steps(Grid(), solved=1e-9, tilt_deg=5.0)
+COARSE = Steps(Grid(15.0, 0.03, least=1, clearance_m=0.01), solved=1e-5, tilt_deg=15.0, room=0.02)
+FULL = Steps(Grid(), solved=1e-9, tilt_deg=5.0, room=0.0)
 
 # What a placement lacks, the worst first: each adds a share of 1 at most.
-_OVERLAPS, _OUT_OF_REACH, _STUCK, _WITHOUT_FORCES = 4.0, 3.0, 2.0, 1.0
+_OVERLAPS, _OUT_OF_REACH, _STUCK, _CRAMPED, _WITHOUT_FORCES = 5.0, 4.0, 3.0, 2.0, 1.0
 # Feasible placements cost less than this.
 _FEASIBLE = 0.999
 # Clearance of the robots' fixed parts [m].
@@ -123,6 +125,12 @@ def assess(
         if not error.share:
             return Value(_OUT_OF_REACH + error.error / (1.0 + error.error), f"{error}")
         return Value(_STUCK + 1.0 - error.share, f"{error}")
+    robot = RobotModel(scenario)
+    room = joint_path.clearance / (robot.q_max - robot.q_min)
+    tight = int(room.argmin())
+    if room[tight] < steps.room:
+        cost = _CRAMPED + 1.0 - float(room[tight]) / steps.room
+        return Value(cost, f"{robot.joints[tight]} within {100 * steps.room:g} % of its limit")
     margins = believed(control, scenario)
     problems = PathProblems(scenario, margins, joint_path=joint_path)
     tilts = problems.tilts(steps.tilt_deg).tolist()
@@ -176,9 +184,10 @@ def settled(scenario: Scenario) -> Scenario:
     Raises:
         PathError: The arms cannot follow the path.
     """
-    joints = RobotModel(scenario).joints
-    q = plan_joints(scenario).holding(0.0).tolist()
-    return with_posture(scenario, dict(zip(joints, map(rounded, q), strict=True)))
+    robot = RobotModel(scenario)
+    angles = [rounded(angle) for angle in plan_joints(scenario).holding(0.0).tolist()]
+    within = np.clip(angles, robot.q_min, robot.q_max).tolist()
+    return with_posture(scenario, dict(zip(robot.joints, within, strict=True)))
 
 
 def touching(scenario: Scenario) -> frozenset[Names]:
