@@ -36,15 +36,19 @@ from sim.sweep.farm import Workers, cluster
 from synthesis import FulcrumError, InvalidInputError
 from synthesis.contact import Array
 
-# Sizes of the first sample, and of CMA-ES's: even shares for 1, 2 and 4 processes.
+# Sizes of the first sample, at most, and of CMA-ES's: even shares for 1, 2 and 4 processes.
 _SAMPLE, _POPULATION = 64, 16
+# CMA-ES wants two numbers at least; one that nothing depends on helps out.
+_NUMBERS = 2
 # First standard deviation of CMA-ES in the unit cube: a quarter of every range.
 _SPREAD = 0.25
 # CMA-ES ends when the costs of its samples lie as near together as this.
 _ALIKE = 1e-5
 # Candidates looked at in full, and how far apart they are, at least, in some number [-].
 _FINALISTS, _APART = 6, 0.01
-# Share of the time that is kept for them.
+# What has to be gained, as a share of the cost: less is noise.
+_GAIN = 1e-3
+# Share of the time that is kept for the candidates.
 _KEPT = 0.35
 
 # Called with evaluations done and in total, and a note.
@@ -155,10 +159,10 @@ def search(
         best, total = sampler.best(), effort.evaluations
         report(sampler.done, total, "the best over the full path")
         before, *looked = call(_look, packed, [None, *best])
-        looked = [found for found in looked if found[1].cost < before[1].cost]
+        looked = [f for f in looked if f[1].cost < (1.0 - _GAIN) * before[1].cost]
         refused = [value.reason for _, value in looked if not value.feasible]
         chosen = sorted((f for f in looked if f[1].feasible), key=lambda found: found[1].cost)
-        taken: tuple[Scenario, Value, Report | None] = (*before, None)
+        taken: tuple[Scenario, Value, Report | None] = (scenario, before[1], None)
         while chosen and time.monotonic() - started < effort.seconds:
             report(sampler.done, total, "in closed loop")
             tried, chosen = chosen[: effort.workers], chosen[effort.workers :]
@@ -185,7 +189,9 @@ class _Sampler:
     """Asks for placements in batches, and keeps what they cost."""
 
     def __init__(self, start: Array, effort: Effort, deadline: float) -> None:
-        self._start, self._effort, self._deadline = start, effort, deadline
+        self._effort, self._deadline = effort, deadline
+        self._used = len(start)
+        self._start = np.append(start, np.full(max(0, _NUMBERS - len(start)), 0.5))
         self._rng = np.random.default_rng(effort.seed)
         self._tried: list[tuple[float, Array]] = []
         self.history: list[tuple[int, float]] = []
@@ -198,10 +204,12 @@ class _Sampler:
 
     def run(self, costs: Callable[[list[Array]], list[float]], report: Progress) -> None:
         """Searches until the evaluations or the time are used up, or nothing changes any more."""
-        first = qmc.Sobol(len(self._start), rng=self._rng).random(_SAMPLE)
+        # A Sobol sample is even if its size is a power of two.
+        size = min(_SAMPLE, 2 ** int(math.log2(max(2, self._effort.evaluations // 2))))
+        first = qmc.Sobol(len(self._start), rng=self._rng).random(size)
         self._take([self._start, *first[1:]], costs, report)
         strategy = cma.CMAEvolutionStrategy(
-            self.best()[0],
+            min(self._tried, key=lambda tried: tried[0])[1],
             _SPREAD,
             {
                 "bounds": [0.0, 1.0],
@@ -219,7 +227,7 @@ class _Sampler:
     def _take(
         self, batch: list[Array], costs: Callable[[list[Array]], list[float]], report: Progress
     ) -> list[float]:
-        found = costs(batch)
+        found = costs([x[: self._used] for x in batch])
         self._tried += zip(found, batch, strict=True)
         least = min(cost for cost, _ in self._tried)
         self.history.append((self.done, least))
@@ -231,7 +239,8 @@ class _Sampler:
     def best(self) -> list[Array]:
         """The placements that cost least, no two alike."""
         found: list[Array] = []
-        for _, x in sorted(self._tried, key=lambda tried: tried[0]):
+        for _, tried in sorted(self._tried, key=lambda tried: tried[0]):
+            x = tried[: self._used]
             if all(np.abs(x - other).max() > _APART for other in found):
                 found.append(x)
             if len(found) == _FINALISTS:

@@ -10,7 +10,6 @@ from scipy.spatial.transform import Rotation
 
 from sim.scenario import Hand, Scenario, Vector
 from sim.shape import Shape, triple
-from sim.shapes import Box
 from synthesis import InvalidInputError
 from synthesis.contact import Array
 
@@ -96,20 +95,16 @@ def faces_of(scenario: Scenario, hand: Hand, allowed: tuple[str, ...], border: f
 
 
 def shape_of(scenario: Scenario) -> Shape:
-    """The object's shape; a single cuboid at its origin is one.
+    """The object's shape.
 
     Raises:
         InvalidInputError: It has none.
     """
     thing = scenario.object
-    if thing.shape is not None:
-        return thing.shape
-    geom = thing.geoms[0]
-    if len(thing.geoms) > 1 or geom.kind != "box" or any(geom.pose.position):
-        raise InvalidInputError(
-            f"{thing.name}.shape", "none", "a shape on whose faces contacts may move"
-        )
-    return Box(triple(2.0 * np.array(geom.size)))
+    if thing.shape is None:
+        valid = "a shape on whose faces contacts may move, or contacts that stay"
+        raise InvalidInputError(f"{thing.name}.shape", "none", valid)
+    return thing.shape
 
 
 def moved(hand: Hand, point: Vector, normal: Vector, shape: Shape) -> Hand:
