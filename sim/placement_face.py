@@ -88,7 +88,7 @@ def faces_of(scenario: Scenario, hand: Hand, allowed: tuple[str, ...], border: f
         valid = f"a point of the surface, such as the nearest one, ({near}), {1e3 * off:.0f} mm off"
         raise InvalidInputError(f"{hand.name}.p_OC_O", hand.p_OC_O, valid)
     names = tuple(dict.fromkeys((place.face, *allowed)))
-    now = _coordinates(shape, place.face, np.asarray(hand.p_OC_O))
+    now = coordinates(shape, place.face, hand.p_OC_O)
     ranges = [_ranges(shape, name, border) for name in names]
     ranges[0] = _containing(ranges[0][0], now[0]), _containing(ranges[0][1], now[1])
     return Faces(hand, shape, names, now, tuple(ranges))
@@ -123,7 +123,7 @@ def moved(hand: Hand, point: Vector, normal: Vector, shape: Shape) -> Hand:
     return replace(hand, p_OC_O=point, normal_O=normal, tangent_O=triple(tangent), geom=geom)
 
 
-def _coordinates(shape: Shape, face: str, p_O: Array) -> tuple[float, float]:
+def coordinates(shape: Shape, face: str, p_O: Vector) -> tuple[float, float]:
     """Coordinates of a point of a face: there is no formula for all shapes."""
 
     def distance(at: Array) -> float:

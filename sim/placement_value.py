@@ -20,6 +20,7 @@ from sim.scenario import Scenario
 from sim.scene import ObjectMotion, compose
 from sim.settings import Control
 from synthesis import InfeasibleError, Objective, SolverError, Synthesizer, UnboundedError
+from synthesis.contact import Array
 from synthesis.relaxation import weight_range
 
 
@@ -161,6 +162,35 @@ def assess(
         Goal.LOWEST_TORQUE: torque,
     }
     return Value(min(costs[goal], _FEASIBLE), "", heaviest, friction, torque, clearance)
+
+
+def over_tilt(
+    scenario: Scenario, control: Control, step_deg: float
+) -> tuple[Array, tuple[Array, Array, Array]]:
+    """What limits a placement, by tilt.
+
+    Args:
+        scenario: The scene.
+        control: The controller, as for :func:`assess`.
+        step_deg: Largest step between tilts [deg].
+
+    Returns:
+        Tilts [deg], (k,), and by tilt the heaviest object [N], and the least shares of friction and
+        of torque that are used [%], (k,) each; NaN without forces.
+
+    Raises:
+        PathError: The arms cannot follow the path.
+    """
+    margins = believed(control, scenario)
+    problems, synthesizer = PathProblems(scenario, margins), Synthesizer()
+    tilts = problems.tilts(step_deg)
+    heaviest = [_span(problems, tilt, synthesizer)[1] for tilt in tilts.tolist()]
+    used = [
+        [_best(problems, tilt, objective, synthesizer) for tilt in tilts.tolist()]
+        for objective in (Objective.FRICTION_MARGIN, Objective.MAX_TORQUE_UTILISATION)
+    ]
+    friction, torque = (np.where(np.isfinite(u), 100.0 * np.array(u), np.nan) for u in used)
+    return tilts, (np.array(heaviest), margins.friction_factor * friction, torque)
 
 
 def believed(control: Control, scenario: Scenario) -> Control:
