@@ -203,7 +203,7 @@ def _print(console: Console, scenario: Scenario, found: Placement) -> None:
     )
 
 
-def _rows(before: Value, after: Value) -> list[tuple[str, str, str]]:
+def _rows(before: Value, after: Value) -> list[tuple[str, ...]]:
     def share(value: float) -> str:
         return f"{100.0 * value:.1f} %" if math.isfinite(value) else "-"
 
@@ -216,14 +216,14 @@ def _rows(before: Value, after: Value) -> list[tuple[str, str, str]]:
     ]
 
 
-def _moves(before: Scenario, after: Scenario) -> list[tuple[str, str, str]]:
+def _moves(before: Scenario, after: Scenario) -> list[tuple[str, ...]]:
     def millimetres(values: tuple[float, ...]) -> str:
         return ", ".join(f"{1e3 * value:.1f}" for value in values) + " mm"
 
     def direction(values: tuple[float, ...]) -> str:
         return ", ".join(f"{value:.3f}" for value in values)
 
-    rows = []
+    rows: list[tuple[str, ...]] = []
     for old, new in zip(before.robots, after.robots, strict=True):
         name = f"{new.prefix}base"
         rows.append((name, millimetres(old.base.position), millimetres(new.base.position)))

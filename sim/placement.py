@@ -163,12 +163,15 @@ def search(
         refused = [value.reason for _, value in looked if not value.feasible]
         chosen = sorted((f for f in looked if f[1].feasible), key=lambda found: found[1].cost)
         taken: tuple[Scenario, Value, Report | None] = (scenario, before[1], None)
-        while chosen and time.monotonic() - started < effort.seconds:
+        end = started + effort.seconds
+        lasted = 0.0
+        while chosen and (begun := time.monotonic()) + lasted < end:
             report(sampler.done, total, "in closed loop")
             tried, chosen = chosen[: effort.workers], chosen[effort.workers :]
             reports = call(_run, packed, [candidate for candidate, _ in tried])
             passed = [i for i, r in enumerate(reports) if not isinstance(r, str)]
             refused += [r for r in reports[: passed[0] if passed else None] if isinstance(r, str)]
+            lasted = time.monotonic() - begun
             if passed:
                 taken = (*tried[passed[0]], reports[passed[0]])
                 break

@@ -45,6 +45,7 @@ def draw(before: Scenario, found: Placement, control: Control, file: Path) -> No
             ax.plot(tilts, curve, style, lw=1.5, label=label)
     weight = before.object.mass * GRAVITY
     panels[0].axhline(weight, color="k", lw=0.8, ls=":", label="its weight")
+    panels[0].set_yscale("log")
     _named(panels[0], "heaviest object [N]")
     _named(panels[1], "friction used, at the least [%]")
     _named(panels[2], "torque used, at the least [%]")
@@ -64,4 +65,5 @@ def draw(before: Scenario, found: Placement, control: Control, file: Path) -> No
 def _named(ax: Axes, label: str) -> None:
     ax.set_ylabel(label)
     ax.grid(alpha=0.3)
-    ax.set_ylim(bottom=0.0)
+    if ax.get_yscale() == "linear":
+        ax.set_ylim(bottom=0.0)
