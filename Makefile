@@ -27,10 +27,11 @@ format: $(STAMP)
 	$(BIN)/ruff format .
 	$(BIN)/ruff check --fix .
 
-# Rewrites the MJCF files that are made from data: the robot from its URDF, the scenes from scenarios.
+# Rewrites the MJCF files that are made from data: the robot from its URDF, the scenes and the
+# schema from scenarios.
 assets: $(STAMP)
 	$(BIN)/python -m assets.from_urdf
-	$(BIN)/python -m scenarios.scenes
+	$(BIN)/python -m scenarios.scene_files
 
 $(STAMP): pyproject.toml constraints.txt
 	$(PYTHON) -m venv .venv

@@ -1,10 +1,9 @@
-"""The scenarios: every module here with a ``SCENARIO`` is one, found by being present."""
+"""The scenarios: every file in the folder ``scenes`` is one, found by being present."""
 
 from __future__ import annotations
 
-import importlib
-import pkgutil
 from functools import cache
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
@@ -13,23 +12,35 @@ if TYPE_CHECKING:
 
 @cache
 def scenarios() -> dict[str, Scenario]:
-    """All scenarios by name."""
-    found = {}
-    for module in pkgutil.iter_modules(__path__):
-        scenario = getattr(importlib.import_module(f"{__name__}.{module.name}"), "SCENARIO", None)
-        if scenario is not None:
-            found[scenario.name] = scenario
-    return found
+    """All scenarios that ship, by name."""
+    from scenarios.file import read, scene_files
+
+    return {name: read(file) for name, file in scene_files().items()}
 
 
-def scenario(name: str) -> Scenario:
-    """The scenario of a name.
+def scenario(name_or_file: str, allowed: tuple[Path, ...] = ()) -> Scenario:
+    """The scenario that ships under a name, or that of a file, which is named as the file.
+
+    Args:
+        name_or_file: Its name, or its file's, which ends in ``.toml``.
+        allowed: Folders besides its own from which a file may have others read.
 
     Raises:
-        InvalidInputError: There is none of that name.
+        InvalidInputError: There is none of that name, or the file is not valid.
     """
-    if name not in scenarios():
+    from scenarios.file import SUFFIX, read
+    from scenarios.file_errors import nearest
+    from scenarios.file_scene import check_scene
+
+    known = scenarios()
+    if name_or_file in known:
+        return known[name_or_file]
+    if not name_or_file.endswith(SUFFIX):
         from synthesis.errors import InvalidInputError
 
-        raise InvalidInputError("scenario", repr(name), f"one of {', '.join(scenarios())}")
-    return scenarios()[name]
+        valid = f"{nearest(name_or_file, list(known))}, or a file ending in {SUFFIX}"
+        raise InvalidInputError("scenario", repr(name_or_file), valid)
+    file = Path(name_or_file)
+    found = read(file, allowed)
+    check_scene(file, found)
+    return found

@@ -13,17 +13,20 @@ from typing import TYPE_CHECKING, Annotated
 
 import tyro
 
+from scenarios.check import Check
 from scenarios.commands import Capacity, Explain
 from scenarios.common import (
     BAD_INPUT,
     FAILED,
     INTERRUPTED,
     PASSED,
+    Chosen,
     chosen_control,
     chosen_planning,
     progress_bar,
     results_folder,
 )
+from scenarios.new import New
 from scenarios.paper.command import Reproduce
 from scenarios.planning import Plan
 from scenarios.sweep import Sweep
@@ -60,11 +63,8 @@ class List:
 
 
 @dataclass(frozen=True)
-class Run:
+class Run(Chosen):
     """Run a scenario headless; write recording, configuration and report; print the verdict."""
-
-    scenario: tyro.conf.Positional[str]
-    """Name of the scenario (see `fulcrum list`)."""
 
     controller: str | None = None
     """See `fulcrum list`; robust if left out, or dynamic with a plan."""
@@ -113,7 +113,7 @@ class Run:
         try:
             request, prepared = self._request()
             assert request.out is not None
-            with progress_bar(self.scenario) as progress:
+            with progress_bar(request.scenario.name) as progress:
                 result = run(request, progress, prepared)
         except UnholdableError as error:
             console, controller = Console(highlight=False), self.controller or "robust"
@@ -132,7 +132,6 @@ class Run:
 
     def _request(self) -> tuple[Request, Preparation | None]:
         """What to run, and what is prepared of it: a planned tilt, if there is to be one."""
-        from scenarios import scenario
         from scenarios.sweep import drawn_world
         from sim.execution import planned_tilt
         from sim.preparation import Preparation
@@ -140,7 +139,7 @@ class Run:
         from sim.settings import stretched
         from synthesis.errors import InvalidInputError
 
-        chosen = scenario(self.scenario)
+        chosen = self.chosen()
         planning, prepared = chosen_planning(self.plan, self.stretch), None
         controller = "robust" if planning is None else "dynamic"
         if self.controller is not None:
@@ -159,7 +158,7 @@ class Run:
         if self.anyway:
             control = replace(control, best_effort=True)
         world = drawn_world(chosen, self.preset, self.seed, self.world)
-        out = results_folder(self.out, f"{self.scenario}-{controller}")
+        out = results_folder(self.out, f"{chosen.name}-{controller}")
         request = Request(
             chosen, controller, control, self.seed, out, self.live, self.anyway, world, planning
         )
@@ -213,6 +212,8 @@ Command = (
     | Annotated[Screenshot, tyro.conf.subcommand("screenshot")]
     | Annotated[View, tyro.conf.subcommand("view")]
     | Annotated[Explain, tyro.conf.subcommand("explain")]
+    | Annotated[Check, tyro.conf.subcommand("check")]
+    | Annotated[New, tyro.conf.subcommand("new")]
     | Annotated[Capacity, tyro.conf.subcommand("capacity")]
     | Annotated[Plan, tyro.conf.subcommand("plan")]
     | Annotated[Reproduce, tyro.conf.subcommand("reproduce")]
@@ -225,8 +226,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
     0 pass, 1 failed its checks, 2 bad input, 130 interrupted.
     """
+    command = None
     try:
-        return _parse(arguments).execute()
+        command = _parse(arguments)
+        return command.execute()
     except KeyboardInterrupt:  # a run that has begun catches it itself
         print("fulcrum: interrupted.", file=sys.stderr)
         return INTERRUPTED
@@ -235,13 +238,14 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
         if not isinstance(error, (FulcrumError, OSError)):
             raise
-        print(f"fulcrum: {' '.join(str(error).split())}", file=sys.stderr)
+        text = command.told(error) if isinstance(command, Chosen) else str(error)
+        print(f"fulcrum: {' '.join(text.split())}", file=sys.stderr)
         return BAD_INPUT
 
 
 def _parse(
     arguments: Sequence[str] | None,
-) -> List | Run | Screenshot | View | Explain | Capacity | Plan | Reproduce | Sweep:
+) -> List | Run | Screenshot | View | Explain | Check | New | Capacity | Plan | Reproduce | Sweep:
     """The command asked for; a parse error leaves as one line instead of tyro's box."""
     errors = io.StringIO()
     try:

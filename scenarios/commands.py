@@ -8,12 +8,11 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-import tyro
-
 from scenarios.common import (
     FAILED,
     INTERRUPTED,
     PASSED,
+    Chosen,
     check_json,
     chosen_control,
     progress_bar,
@@ -37,11 +36,8 @@ _VISIBLE_PER_M = 0.01
 
 
 @dataclass(frozen=True)
-class Explain:
+class Explain(Chosen):
     """Say why a scenario's problem has no solution and what would help, or how much it bears."""
-
-    scenario: tyro.conf.Positional[str]
-    """Name of the scenario (see `fulcrum list`)."""
 
     controller: str = "margin"
     """Whose margins count: robust, margin, paper or no-feedforward."""
@@ -59,7 +55,6 @@ class Explain:
         """Does it; returns the exit code: 0 feasible, 1 infeasible."""
         from rich.console import Console
 
-        from scenarios import scenario
         from sim.explain import explain, tightest_tilt
         from sim.files import write_json
         from sim.poses import PathProblems
@@ -67,7 +62,7 @@ class Explain:
         from synthesis import Synthesizer
 
         check_json(self.json)
-        chosen = scenario(self.scenario)
+        chosen = self.chosen()
         control = chosen_control(chosen, self.controller, self.objective)
         problems, synthesizer = PathProblems(chosen, control), Synthesizer()
         tilt = self.tilt_deg
@@ -87,11 +82,8 @@ class Explain:
 
 
 @dataclass(frozen=True)
-class Capacity:
+class Capacity(Chosen):
     """Find the heaviest object that the robot can pivot over the whole path, and can lift."""
-
-    scenario: tyro.conf.Positional[str]
-    """Name of the scenario (see `fulcrum list`)."""
 
     controller: str = "margin"
     """Whose margins count: margin, paper or no-feedforward."""
@@ -106,16 +98,15 @@ class Capacity:
         """Does it; returns the exit code: 1 if a run does not confirm what was found."""
         from rich.console import Console
 
-        from scenarios import scenario
         from sim.capacity import capacities, confirm
         from sim.files import write_json
         from sim.report import Verdict
 
         check_json(self.json)
-        chosen = scenario(self.scenario)
+        chosen = self.chosen()
         control = chosen_control(chosen, self.controller, None)
         console = Console(highlight=False)
-        with progress_bar(self.scenario) as progress:
+        with progress_bar(chosen.name) as progress:
             found = capacities(chosen, control, progress)
         for capacity in found:
             _print_capacity(console, capacity)
@@ -132,7 +123,7 @@ class Capacity:
                 _print_trial(console, trial)
         if self.json is not None:
             content = {
-                "scenario": self.scenario,
+                "scenario": chosen.name,
                 "controller": self.controller,
                 "capacities": [dataclasses.asdict(capacity) for capacity in found],
                 "trials": [dataclasses.asdict(trial) for trial in trials],

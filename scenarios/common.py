@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import contextlib
+import itertools
 from collections.abc import Iterator
-from dataclasses import replace
+from dataclasses import dataclass, field, replace
 from datetime import datetime
 from enum import StrEnum
 from pathlib import Path
 from typing import TYPE_CHECKING, Protocol, TypeVar
+
+import tyro
 
 if TYPE_CHECKING:
     from sim.execution import Planning
@@ -18,6 +21,49 @@ if TYPE_CHECKING:
 Kind = TypeVar("Kind", bound=StrEnum)
 
 PASSED, FAILED, BAD_INPUT, INTERRUPTED = 0, 1, 2, 130
+
+
+@dataclass(frozen=True)
+class Chosen:
+    """What every command on a scenario is told."""
+
+    scenario: tyro.conf.Positional[str]
+    """Name of a scenario (see `fulcrum list`), or a file ending in .toml (see `fulcrum new`)."""
+
+    allow_path: tyro.conf.UseAppendAction[tuple[Path, ...]] = field(default=(), kw_only=True)
+    """Folder besides its own from which the file may have meshes and robots read."""
+
+    def chosen(self) -> Scenario:
+        """The scenario.
+
+        Raises:
+            InvalidInputError: There is none of that name, or the file is not valid.
+        """
+        from scenarios import scenario
+
+        return scenario(self.scenario, self.allow_path)
+
+    def told(self, error: Exception) -> str:
+        """An error as a sentence, with the scenario's file, if it has one, and what may help."""
+        from scenarios.file import SUFFIX, open_source
+        from scenarios.file_errors import FileError
+        from sim.ik import PathError
+
+        if not self.scenario.endswith(SUFFIX) or isinstance(error, FileError):
+            return str(error)
+        if not isinstance(error, PathError):
+            return f"{self.scenario}: {error}"
+        line = open_source(Path(self.scenario)).line(("path",))
+        return (
+            f"{self.scenario}:{line}: path: {str(error).rstrip('.')}; "
+            f"`fulcrum place {self.scenario}` seeks places for object, robots and hands that can."
+        )
+
+    @property
+    def words(self) -> list[str]:
+        """How a command line names it."""
+        allowed = [("--allow-path", str(folder)) for folder in self.allow_path]
+        return [self.scenario, *itertools.chain.from_iterable(allowed)]
 
 
 def chosen_control(scenario: Scenario, controller: str, objective: str | None) -> Control:

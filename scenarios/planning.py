@@ -7,9 +7,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-import tyro
-
-from scenarios.common import FAILED, PASSED, one_of, results_folder
+from scenarios.common import FAILED, PASSED, Chosen, one_of, results_folder
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -24,11 +22,8 @@ _LISTED = 0.5
 
 
 @dataclass(frozen=True)
-class Plan:
+class Plan(Chosen):
     """Plan the fastest, easiest or safest tilt, with the forces along it; draw and write it."""
-
-    scenario: tyro.conf.Positional[str]
-    """Name of the scenario (see `fulcrum list`)."""
 
     objective: str = "least-time"
     """least-time, least-effort or friction-margin."""
@@ -76,18 +71,17 @@ class Plan:
         """Does it; returns the exit code: 1 if there is no such plan."""
         from rich.console import Console
 
-        from scenarios import scenario
         from sim.files import write_json
         from sim.plan import PlanError, plan
         from sim.plan_file import plan_content
         from sim.plan_picture import draw
         from synthesis.uncertainty_set import UncertaintySet
 
-        chosen = scenario(self.scenario)
+        chosen = self.chosen()
         objective, duration = self._asked(chosen)
         margins = self._margins(chosen)
         uncertainty = UncertaintySet(self.mass, (self.center,) * 3, self.friction)
-        out = results_folder(self.out, f"{self.scenario}-plan")
+        out = results_folder(self.out, f"{chosen.name}-plan")
         try:
             planned = plan(chosen, margins, objective, duration, self.points, uncertainty)
             if self.stretch != 1.0:

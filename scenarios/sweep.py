@@ -10,12 +10,11 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-import tyro
-
 from scenarios.common import (
     FAILED,
     INTERRUPTED,
     PASSED,
+    Chosen,
     chosen_planning,
     dated_folder,
     progress_bar,
@@ -33,11 +32,8 @@ _NAMED = 4
 
 
 @dataclass(frozen=True)
-class Sweep:
+class Sweep(Chosen):
     """Run a scenario in many worlds: success rates, causes of failure, success map, replays."""
-
-    scenario: tyro.conf.Positional[str]
-    """Name of the scenario (see `fulcrum list`)."""
 
     episodes: int
     """How many worlds; with a grid, at each of its points."""
@@ -90,11 +86,11 @@ class Sweep:
             print(error)
             return FAILED
         pair = self._map(sweep)
-        folder = self.out or dated_folder(f"sweep-{self.scenario}-{self.preset}")
+        folder = self.out or dated_folder(f"sweep-{sweep.scenario.name}-{self.preset}")
         store = Store(sweep, folder)
         before, started = len(store.missing()), time.perf_counter()
         try:
-            with progress_bar(self.scenario) as move:
+            with progress_bar(sweep.scenario.name) as move:
                 rows = run_sweep(
                     sweep,
                     store,
@@ -117,7 +113,7 @@ class Sweep:
         found = scores(rows, hands)
         draw_map(rows, sweep, pair, store.folder / MAP)
         summary = {
-            "scenario": self.scenario,
+            "scenario": sweep.scenario.name,
             "preset": self.preset,
             "episodes": self.episodes,
             "seed": self.seed,
@@ -141,13 +137,12 @@ class Sweep:
         return PASSED
 
     def _sweep(self) -> Design:
-        from scenarios import scenario
         from sim.execution import planned_tilt
         from sim.settings import controllers
         from sim.sweep.design import Sweep as Design
         from sim.sweep.parameters import parse_grid
 
-        chosen, planning = scenario(self.scenario), chosen_planning(self.plan, self.stretch)
+        chosen, planning = self.chosen(), chosen_planning(self.plan, self.stretch)
         if planning is not None:
             chosen = planned_tilt(chosen, planning).scenario
         if self.controllers is None:
@@ -164,6 +159,7 @@ class Sweep:
             seed=self.seed,
             grid=parse_grid("--grid", self.grid),
             planning=planning,
+            called=shlex.join(self.words),
         )
 
     def _map(self, sweep: Design) -> tuple[str, str]:
@@ -181,10 +177,10 @@ class Sweep:
 
     def _again(self, folder: Path) -> str:
         """The command that goes on with this sweep."""
-        words = ["fulcrum", "sweep", self.scenario]
+        words = ["fulcrum", "sweep", *self.words]
         for field in dataclasses.fields(self):
             value = folder if field.name == "out" else getattr(self, field.name)
-            if field.name != "scenario" and value not in (None, ""):
+            if field.name not in ("scenario", "allow_path") and value not in (None, ""):
                 words += [f"--{field.name}", str(value)]
         return shlex.join(words)
 

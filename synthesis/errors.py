@@ -18,7 +18,7 @@ class InvalidInputError(FulcrumError, ValueError):
     """A field of a problem, scenario or configuration is non-finite, mis-shaped or senseless."""
 
     def __init__(self, field: str, given: object, valid: str) -> None:
-        self.field = field
+        self.field, self.given, self.valid = field, given, valid
         super().__init__(f"{field}: got {_on_one_line(given)}; valid is {valid}.")
 
 

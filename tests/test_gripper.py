@@ -9,8 +9,7 @@ import pytest
 import trimesh
 
 from assets import asset_path, velocity_limits
-from scenarios import cylinder_tilt
-from scenarios.cylinder_tilt import INNER, OUTER, SCENARIO
+from scenarios import scenario
 from sim.ik import PathError, plan_joints
 from sim.poses import PathProblems
 from sim.recording.scenery import Scenery
@@ -21,6 +20,8 @@ from sim.settings import Control, stretched
 from synthesis import InfeasibleError, Synthesizer
 from synthesis.contact import Array
 
+SCENARIO = scenario("cylinder-tilt")
+OUTER, INNER, LENGTH = 0.18, 0.15, 0.5  # [m]: Table I of the paper
 FINGERS = ["outer_finger", "inner_finger"]
 SLIDES = ["slide_x", "slide_y", "slide_z"]
 HINGES = ["wrist_pitch", "wrist_yaw", "wrist_roll"]
@@ -69,7 +70,7 @@ def test_the_stage_has_six_joints_and_each_finger_one_of_30_newtons(gripper):
         np.testing.assert_array_equal(limit, gripper.jnt_actfrcrange[gripper.joint(name).id])
         assert limit[1] == -limit[0]
         assert (limit[1] == 30.0) if name in FINGERS else limit[1] >= 30.0
-    assert cylinder_tilt.FINGER_LIMIT == 30.0
+    assert {hand.f_n_max for hand in SCENARIO.hands} == {30.0}
 
 
 def test_every_joint_has_a_range_and_a_speed_limit(gripper):
@@ -154,7 +155,7 @@ def test_the_fingers_share_the_stage_but_not_each_other():
 def annulus_inertia(inner: float) -> np.ndarray:
     """Principal moments by trimesh of the tube of the cylinder's mass, along the axis first."""
     # 2048 facets leave out 2e-6 of the cross-section.
-    tube = trimesh.creation.annulus(inner, OUTER, cylinder_tilt.LENGTH, sections=2048)
+    tube = trimesh.creation.annulus(inner, OUTER, LENGTH, sections=2048)
     tube.density = SCENARIO.object.mass / tube.volume
     across, _, along = np.diag(tube.moment_inertia)
     return np.array([along, across, across])

@@ -10,7 +10,7 @@ from scipy.spatial.transform import Rotation
 
 from assets import asset_path, robot_path
 from scenarios import scenario, scenarios
-from scenarios.scenes import scene_xml
+from scenarios.scene_files import scene_xml
 from sim.scenario import Friction, Geom, Pose
 from sim.scene import ObjectMotion, compose, hand_body, tip_geom, tip_site
 

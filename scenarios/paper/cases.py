@@ -8,8 +8,6 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from scenarios import scenario
-from scenarios.box_tilt import HEIGHT
-from scenarios.cylinder_tilt import LENGTH as CYLINDER_LENGTH
 from sim.poses import PathProblems
 from sim.scenario import Scenario
 from synthesis import InfeasibleError, Objective, Solution, Synthesizer
@@ -60,16 +58,14 @@ def sweep(problems: PathProblems, tilts_deg: Iterable[float]) -> Sweep:
 def paper_cylinder() -> Scenario:
     """The cylinder as the paper's figures need it: fingers at the very rim, tilted to 90 deg."""
     tilted = scenario("cylinder-tilt")
-    at_rim = tuple(
-        replace(hand, p_OC_O=(CYLINDER_LENGTH / 2, *hand.p_OC_O[1:])) for hand in tilted.hands
-    )
+    rim = -tilted.supports[0].p_OP_O[0]
+    at_rim = tuple(replace(hand, p_OC_O=(rim, *hand.p_OC_O[1:])) for hand in tilted.hands)
     return replace(tilted, hands=at_rim, path=replace(tilted.path, angle_deg=90.0))
 
 
 def paper_box(up: float) -> Scenario:
     """The box with its hand contacts at a height above the edge [m]."""
     tilted = scenario("box-tilt")
-    hands = tuple(
-        replace(hand, p_OC_O=(*hand.p_OC_O[:2], up - HEIGHT / 2)) for hand in tilted.hands
-    )
+    edge = tilted.supports[0].p_OP_O[2]
+    hands = tuple(replace(hand, p_OC_O=(*hand.p_OC_O[:2], edge + up)) for hand in tilted.hands)
     return replace(tilted, hands=hands)

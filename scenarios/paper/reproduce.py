@@ -10,7 +10,6 @@ from pathlib import Path
 import numpy as np
 
 from scenarios import scenario
-from scenarios.cylinder_tilt import DEPTH
 from scenarios.paper.cases import (
     FORCE_OBJECTIVES,
     PAPER_TILT_DEG,
@@ -162,10 +161,12 @@ def _margins(chosen: Scenario) -> str:
 
 
 def _cylinder_figures(sweeps: dict[str, Sweep], loop: Loop) -> list[Figure]:
+    tilted = scenario("cylinder-tilt")
+    depth = -tilted.supports[0].p_OP_O[0] - tilted.hands[0].p_OC_O[0]
     caption = (
         "Cylinder of Table I: 30 N, 0.36/0.30 x 0.5 m, mu_E 0.2, mu_C 0.15, e_n 0.25 m, grip at "
         "most 30 N, fingers at the rim of the upper wall. With margin and in closed loop: fingers "
-        f"{DEPTH} m inside, {_margins(scenario('cylinder-tilt'))}."
+        f"{depth:.2g} m inside, {_margins(tilted)}."
     )
     fingers = {"f_n1 (outer)": 0, "f_n2 (inner)": 1}
     rim = {"f_En": 2}

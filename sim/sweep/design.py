@@ -60,6 +60,7 @@ class Sweep:
         grid: What is set of the drawn worlds.
         criteria: What counts as success.
         planning: How the tilt is planned, where the scenario is that of a planned tilt; else None.
+        called: How command lines name the scenario; by its name if empty.
     """
 
     scenario: Scenario
@@ -70,6 +71,7 @@ class Sweep:
     grid: Grid = ()
     criteria: Criteria = Criteria()
     planning: Planning | None = None
+    called: str = ""
 
     def __post_init__(self) -> None:
         known = controllers(self.scenario.control)
@@ -106,7 +108,7 @@ class Sweep:
     def replay(self, episode: Episode) -> str:
         """The command that runs an episode again, with a recording."""
         words = [
-            f"fulcrum run {self.scenario.name} --controller {episode.controller}",
+            f"fulcrum run {self.called or self.scenario.name} --controller {episode.controller}",
             f"--preset {self.preset} --seed {episode.seed}",
         ]
         if self.planning is not None:

@@ -1,11 +1,13 @@
-"""Writes every scenario's scene as an MJCF file that MuJoCo's own viewer opens."""
+"""Writes what is made of scenarios: scenes that MuJoCo's own viewer opens, and the schema."""
 
 from __future__ import annotations
 
+import json
 from pathlib import Path
 
 import assets
 from scenarios import scenarios
+from scenarios.file import SCHEMA, schema
 from sim.ik import plan_joints
 from sim.plant import Plant
 from sim.scenario import Scenario
@@ -22,8 +24,14 @@ def scene_xml(scenario: Scenario) -> str:
     return header + str(spec.to_xml())
 
 
+def schema_json() -> str:
+    """The JSON Schema of scenario files, as it is published."""
+    return json.dumps(schema(), indent=2) + "\n"
+
+
 def main() -> None:
     """Rewrites the files."""
+    SCHEMA.write_text(schema_json())
     for scenario in scenarios().values():
         (Path(assets.__file__).parent / f"{scenario.name}.xml").write_text(scene_xml(scenario))
 

@@ -1,0 +1,132 @@
+"""Scenario files: TOML that says everything about a scenario, and its published schema.
+
+A file can run no code, and reads no other files than those in its folder, or where the command line
+allows it.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+from typing import Any, TypeVar
+
+from pydantic import TypeAdapter, ValidationError
+
+from scenarios.file_build import build
+from scenarios.file_errors import FileError, Source, explained, nearest
+from scenarios.file_keys import Table
+from scenarios.file_models import LiftedFile, ScenarioFile
+from scenarios.file_places import Places, vector
+from sim.scenario import Scenario, lifted
+from sim.settings import HOLD, tilting
+
+SUFFIX = ".toml"
+SCENES = Path(__file__).parent / "scenes"
+TEMPLATE = Path(__file__).parent / "template.toml"
+SCHEMA = SCENES / "scenario.schema.json"
+# Longer ones are no scenario [bytes].
+_LONGEST = 2_000_000
+
+
+def read(file: Path, allowed: tuple[Path, ...] = ()) -> Scenario:
+    """The scenario of a file, named as the file is.
+
+    Args:
+        file: The file.
+        allowed: Folders besides its own from which it may have other files read.
+
+    Raises:
+        FileError: It is not valid; says where and why.
+    """
+    return made(open_source(file), allowed)
+
+
+def made(source: Source, allowed: tuple[Path, ...] = ()) -> Scenario:
+    """The scenario of a text, as :func:`read` of the file that it is for.
+
+    Raises:
+        FileError: It is not valid; says where and why.
+    """
+    if "lifted_from" in source.data:
+        return _lifted(source, _validated(source, LiftedFile), allowed)
+    return build(source, _validated(source, ScenarioFile), Places(source, allowed))
+
+
+def read_tables(file: Path) -> ScenarioFile:
+    """What a scenario file says, table by table: also what is no part of the scenario itself.
+
+    Raises:
+        FileError: It is not valid, or says no more than what it is lifted from.
+    """
+    return _validated(open_source(file), ScenarioFile)
+
+
+def open_source(file: Path) -> Source:
+    """The text of a file.
+
+    Raises:
+        FileError: It cannot be read, or is no TOML.
+    """
+    valid = f"a scenario file, like those that `fulcrum new` writes, with the ending {SUFFIX}"
+    try:
+        if file.stat().st_size > _LONGEST:
+            raise FileError(file, None, "", f"{file.stat().st_size} bytes", valid)
+        return Source(file, file.read_text(encoding="utf-8"))
+    except OSError as error:
+        raise FileError(file, None, "", error.strerror or str(error), valid) from None
+    except ValueError as error:  # no UTF-8, or a name with a zero in it
+        if isinstance(error, FileError):
+            raise
+        raise FileError(file, None, "", "no UTF-8 text", valid) from None
+
+
+Model = TypeVar("Model", bound=Table)
+
+
+def _validated(source: Source, model: type[Model]) -> Model:
+    try:
+        return model.model_validate(source.data)
+    except ValidationError as error:
+        raise explained(source, model, error) from None
+
+
+def _lifted(source: Source, table: LiftedFile, allowed: tuple[Path, ...]) -> Scenario:
+    """The other scenario without its environment contacts."""
+    key = ("lifted_from",)
+    shipped = scene_files()
+    if table.lifted_from in shipped:
+        other = shipped[table.lifted_from]
+    elif table.lifted_from.endswith(SUFFIX):
+        other = Places(source, allowed).file(key, table.lifted_from, "a scenario file")
+    else:
+        valid = f"{nearest(table.lifted_from, list(shipped))}, or a file ending in {SUFFIX}"
+        raise source.error(key, f'"{table.lifted_from}"', valid)
+    if "lifted_from" in open_source(other).data:
+        raise source.error(key, f'"{table.lifted_from}"', "a scenario that is not lifted itself")
+    scenario = lifted(read(other, allowed))
+    phases = scenario.phases
+    if table.after == "hold":
+        last = max(tilting(phases))
+        phases = (*phases[: last + 1], *HOLD)
+    return replace(
+        scenario,
+        name=source.file.stem,
+        summary=table.summary,
+        path=replace(scenario.path, travel=vector(table.travel_m)),
+        phases=phases,
+    )
+
+
+def scene_files() -> dict[str, Path]:
+    """The files of the scenes that ship, by name."""
+    return {path.stem: path for path in sorted(SCENES.glob(f"*{SUFFIX}"))}
+
+
+def schema() -> dict[str, Any]:
+    """The JSON Schema of scenario files."""
+    made = TypeAdapter(ScenarioFile | LiftedFile).json_schema()
+    return {
+        "$schema": "https://json-schema.org/draft/2020-12/schema",
+        "title": "fulcrum scenario",
+        **made,
+    }

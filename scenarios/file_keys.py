@@ -1,0 +1,57 @@
+"""What kinds of values the keys of a scenario file take; the models are made of them."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+from annotated_types import Ge, Gt, Len
+from pydantic import BaseModel, ConfigDict, Field
+
+# Forms of text.
+NAME = r"^[A-Za-z][A-Za-z0-9_-]*$"
+CORNER = r"^[+-]x ?[+-]y ?[+-]z$"
+PREFIX = r"^([A-Za-z][A-Za-z0-9_]*)?$"
+
+Number = Annotated[float, Field(strict=True)]
+Positive = Annotated[Number, Gt(0.0)]
+NotNegative = Annotated[Number, Ge(0.0)]
+Vector3 = Annotated[list[Number], Len(3, 3), Field(examples=[[0.0, 0.0, 0.0]])]
+# Directions need not be of length 1.
+Direction = Annotated[list[Number], Len(3, 3), Field(examples=[[0.0, 0.0, 1.0]])]
+Quaternion4 = Annotated[list[Number], Len(4, 4), Field(examples=[[1.0, 0.0, 0.0, 0.0]])]
+# Where on a face, along each of its two coordinates.
+Place2 = Annotated[
+    list[Annotated[Number, Field(ge=0.0, le=1.0)]], Len(2, 2), Field(examples=[[0.5, 0.5]])
+]
+Size3 = Annotated[list[Positive], Len(3, 3), Field(examples=[[0.01, 0.01, 0.01]])]
+# What bodies, geoms and contacts are called in the simulation, in reports and in recordings.
+Name = Annotated[str, Field(pattern=NAME)]
+Corner = Annotated[str, Field(pattern=CORNER, examples=["-x +y -z"])]
+Colour = Annotated[list[Annotated[Number, Ge(0.0), Field(le=1.0)]], Len(4, 4)]
+Face = Annotated[str, Field(max_length=20, examples=["+y"])]
+Text = Annotated[str, Field(min_length=1, max_length=200)]
+
+
+class Table(BaseModel):
+    """A table of the file: no other keys than these, no conversions, no infinite numbers."""
+
+    model_config = ConfigDict(
+        extra="forbid",
+        strict=True,
+        frozen=True,
+        use_attribute_docstrings=True,
+        allow_inf_nan=False,
+    )
+
+
+class Placed(Table):
+    """Something with a pose."""
+
+    position_m: Vector3 = [0.0, 0.0, 0.0]
+    """Position in the world [m]."""
+
+    rpy_deg: Vector3 | None = None
+    """Orientation as roll, pitch and yaw about the fixed axes x, y and z, in this order [deg]."""
+
+    quaternion: Quaternion4 | None = None
+    """Orientation as a quaternion wxyz, instead of rpy_deg."""

@@ -1,0 +1,67 @@
+"""What only the composed scene shows to be wrong with a scenario file."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from scenarios.file import open_source
+from scenarios.file_errors import FileError, Key, Source, nearest
+from sim.scenario import Scenario
+from sim.scene import compose
+from synthesis import InvalidInputError
+
+_ONE_OF = "one of "
+
+
+def check_scene(file: Path, scenario: Scenario) -> None:
+    """Composes the scene: only then it is known which joints and bodies the robots have.
+
+    Raises:
+        FileError: The file names what they do not have, or gives angles out of range.
+    """
+    source = open_source(file)
+    try:
+        compose(scenario)
+    except FileError:
+        raise
+    except InvalidInputError as error:
+        given, valid = str(error.given), error.valid
+        key = _scene_key(source, scenario, error.field, given)
+        if valid.startswith(_ONE_OF):
+            valid = nearest(given, valid.removeprefix(_ONE_OF).split(", "))
+        raise source.error(key, given, valid) from None
+
+
+def _scene_key(source: Source, scenario: Scenario, field: str, given: str) -> Key:
+    """The key that a field of the scenario comes from, as far as it can be told."""
+    if "lifted_from" in source.data:
+        return ("lifted_from",)
+    head, *rest = field.split(".")
+    for hand in scenario.hands:
+        if head == hand.name:
+            return ("hands", head, "mount" if rest == ["mount"] else "tip")
+    for index, robot in enumerate(scenario.robots):
+        if head == robot.label:
+            return _robot_key(source, index, [*rest, given][:2])
+    if head in source.data.get("environment", {}):
+        return ("environment", head)
+    return ()
+
+
+# Keys of a robot's table that hold what a field of the dataclass does.
+_ROBOT_KEYS = {
+    "posture": ("posture_deg", "posture_rad", "posture_m"),
+    "torque_limits": ("torque_limit_nm", "force_limit_n"),
+    "speed_limits": ("speed_limit_rad_s", "speed_limit_m_s"),
+}
+
+
+def _robot_key(source: Source, index: int, rest: list[str]) -> Key:
+    """The key of what a robot is refused for: a field and perhaps a joint."""
+    table, key = source.data["robots"][index], ("robots", index)
+    field, joint = rest
+    names = [n for n in _ROBOT_KEYS.get(field, (field,)) if n in table]
+    for name in names:
+        if isinstance(table[name], dict) and joint in table[name]:
+            return (*key, name, joint)
+    return (*key, names[0]) if names else key
