@@ -236,14 +236,6 @@ def test_a_claim_that_is_not_so_would_be_caught():
     )
 
 
-def test_where_nothing_better_is_found_the_scenario_comes_back_as_it_was():
-    nowhere = Freedom(**{**STILL, "x": (-1e-6, 0.0)})
-    found = search(SCENE, "margin", Goal.HEAVIEST, nowhere, Effort(8, workers=1))
-    assert not found.improved
-    assert found.scenario is SCENE
-    assert found.after == found.before
-
-
 def test_an_unknown_controller_or_effort_is_refused():
     with pytest.raises(InvalidInputError, match=r"one of robust"):
         search(SCENE, "best")
