@@ -22,8 +22,10 @@ if TYPE_CHECKING:
     from sim.scenario import Scenario
 
 Kept = Literal["base", "hands", "turn", "posture"]
-# Share of an angle's change below which it is not listed [deg].
+# Changes of angles below this are not listed [deg].
 _LISTED_DEG = 1.0
+# Share of the time for the search; start, file and picture take the rest [-].
+_SEARCHED = 0.9
 
 
 @dataclass(frozen=True)
@@ -79,7 +81,7 @@ class Place(Chosen):
         from sim.placement_value import Goal
 
         goal = one_of(Goal, "--goal", self.goal)
-        effort = Effort(self.evaluations, self.seconds, self.seed, self.workers)
+        effort = Effort(self.evaluations, _SEARCHED * self.seconds, self.seed, self.workers)
         scenario = self.chosen()
         control = chosen_control(scenario, self.controller, None)
         source, out = self._source(), self._out()

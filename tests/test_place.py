@@ -25,18 +25,8 @@ phases = [
     { name = "hold", duration_s = 0.1, tilt = 1.0, gap_m = 0.0, grip = 1.0 },
 ]
 """
-QUICK = [
-    "--evaluations",
-    "16",
-    "--workers",
-    "1",
-    "--keep",
-    "hands",
-    "--keep",
-    "turn",
-    "--keep",
-    "posture",
-]
+QUICK = ["--evaluations", "16", "--workers", "1"]
+QUICK += [word for kept in ("hands", "turn", "posture") for word in ("--keep", kept)]
 
 
 @pytest.fixture
