@@ -2,9 +2,10 @@ PYTHON ?= python3.11
 BIN := .venv/bin
 STAMP := .venv/.installed
 BENCH_STAMP := .venv/.installed-bench
+DOCS_STAMP := .venv/.installed-docs
 OUT ?= logs/benchmark.json
 
-.PHONY: demo test bench lint type format assets clean
+.PHONY: demo test bench docs lint type format assets clean
 
 demo: $(STAMP)
 	$(BIN)/fulcrum run box-tilt
@@ -15,6 +16,11 @@ test: $(STAMP)
 # One process, nothing beside it: what is timed is compared within this run.
 bench: $(BENCH_STAMP)
 	$(BIN)/pytest tests/bench -n 0 --out $(OUT)
+
+# Into site/, without network; warnings are errors, but with --quiet mkdocs would not count them.
+docs: $(DOCS_STAMP)
+	NO_MKDOCS_2_WARNING=1 $(BIN)/python -m mkdocs build
+	@echo "site/index.html"
 
 lint: $(STAMP)
 	$(BIN)/ruff check .
@@ -42,5 +48,9 @@ $(BENCH_STAMP): $(STAMP)
 	$(BIN)/pip install --quiet --disable-pip-version-check -c constraints.txt -e ".[dev,bench]"
 	touch $@
 
+$(DOCS_STAMP): $(STAMP)
+	$(BIN)/pip install --quiet --disable-pip-version-check -c constraints.txt -e ".[dev,docs]"
+	touch $@
+
 clean:
-	rm -rf .venv
+	rm -rf .venv site

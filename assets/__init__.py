@@ -19,12 +19,13 @@ DESCRIPTIONS = "example-robot-data"
 ROBOTS: dict[str, str | None] = {
     "baxter": "baxter_description/urdf/baxter.urdf",
     "gripper": None,
+    "panda": "panda_description/urdf/panda.urdf",
+    "ur5": "ur_description/urdf/ur5_robot.urdf",
 }
 """The robots that ship, each with the description whose meshes recordings show."""
 HANDS = ("finger_tip", "palm_pad")
 """The hands that ship."""
 
-_MESH_URI = "package://example-robot-data/robots/"
 _HERE = Path(__file__).parent
 
 
@@ -41,33 +42,6 @@ def asset_path(name: str) -> Path:
     if name not in valid:
         raise FileNotFoundError(f"asset: got {name!r}; valid is one of {', '.join(valid)}.")
     return _HERE / name
-
-
-def robot_path(model: str) -> Path:
-    """Path of a robot that ships, or of a file.
-
-    Raises:
-        FileNotFoundError: There is neither; the message lists the valid names.
-    """
-    return _shipped_or_file(model, tuple(ROBOTS))
-
-
-def hand_path(model: str) -> Path:
-    """Path of a hand that ships, or of a file.
-
-    Raises:
-        FileNotFoundError: There is neither; the message lists the valid names.
-    """
-    return _shipped_or_file(model, HANDS)
-
-
-def _shipped_or_file(model: str, shipped: tuple[str, ...]) -> Path:
-    if model in shipped:
-        return asset_path(f"{model}.xml")
-    if not Path(model).is_file():
-        valid = f"one of {', '.join(shipped)}, or the path of a file"
-        raise FileNotFoundError(f"model: got {model!r}; valid is {valid}.")
-    return Path(model)
 
 
 def description_path(relative: str) -> Path:
@@ -94,18 +68,6 @@ def description_path(relative: str) -> Path:
             f"({DESCRIPTIONS} {wheel.version})."
         )
     return path
-
-
-def mesh_path(uri: str) -> Path:
-    """Path of a mesh that a URDF among the descriptions names.
-
-    Raises:
-        ValueError: If the URI does not point into the installed descriptions.
-        FileNotFoundError: If the file is missing.
-    """
-    if not uri.startswith(_MESH_URI):
-        raise ValueError(f"mesh: got {uri!r}; valid starts with {_MESH_URI}.")
-    return description_path(uri.removeprefix(_MESH_URI))
 
 
 def velocity_limits(model: mujoco.MjModel) -> dict[str, float]:

@@ -1,214 +1,92 @@
-"""Makes `baxter.xml` from the official URDF: `python -m assets.from_urdf` rewrites the file.
-
-MuJoCo's own URDF reader gives the kinematics and the inertias; the shapes are the URDF's collision
-primitives, with boxes in place of meshes; names, colours, motors and speed limits are added, and
-every number is written with all its digits (`MjSpec.to_xml` keeps only six).
-"""
+"""Makes the robots that ship from their official URDFs: `python -m assets.from_urdf`."""
 
 from __future__ import annotations
 
-import copy
-import xml.etree.ElementTree as ET
-from collections.abc import Iterable
+from dataclasses import dataclass, field
 from importlib.metadata import version
 from pathlib import Path
 
-import mujoco
-import numpy as np
-import trimesh
-from numpy.typing import NDArray
-from trimesh.intersections import slice_faces_plane
+from assets import DESCRIPTIONS, ROBOTS, description_path
+from assets.urdf import mjcf_of, text, without_branches
 
-from assets import DESCRIPTIONS, description_path
-from assets.meshes import UNPAINTED, read_mesh
-from assets.visuals import pose_of, rgba_of, scale_of
-
-BAXTER = "baxter_description/urdf/baxter.urdf"
 GRIPPER_JOINTS = ("left_gripper_base_joint", "right_gripper_base_joint")
-PLACEHOLDER = 0.001
-"""Spheres of this radius [m] stand in the URDF where a link has no real collision shape."""
-CUTS = {"torso": (0.05, 0.21, 0.6, 0.71), "pedestal": (-0.642,)}
-"""Heights [m] at which a mesh's outline jumps; each slice between them becomes one box."""
-DEFAULT = """
-<default>
-  <default class="baxter">
-    <geom contype="0" conaffinity="0" mass="0"/>
-  </default>
-</default>"""
 HEADER = """\
-<!-- Rethink Robotics Baxter without its electric grippers, from {path}
-     of {wheel} {version} (BSD).
+<!-- {title}, from {path}
+     of {wheel} {version} ({licence}).
      Made by `python -m assets.from_urdf`: do not edit.
      A joint's `user` number is its speed limit [rad/s]. -->
 """
-GUARDS = ("collision_head_link_1", "collision_head_link_2")
-"""Links whose spheres keep the arms off the head; in group 3, which viewers hide."""
 
 
-def baxter_urdf() -> str:
-    """Text of the official URDF without the electric grippers: what `baxter.xml` is made from."""
-    return without_branches(description_path(BAXTER).read_text(), GRIPPER_JOINTS)
+@dataclass(frozen=True)
+class Recipe:
+    """What is made of an official URDF.
 
-
-def without_branches(urdf: str, joints: tuple[str, ...]) -> str:
-    """The URDF without the given joints and all links and joints that hang from them.
-
-    Notes for Gazebo and ROS transmissions go too, since they may name what is removed; all other
-    elements stay as they are.
-
-    Raises:
-        ValueError: If a joint is missing; the message lists the valid ones.
+    Attributes:
+        title: What it is.
+        licence: Of the description.
+        without: Joints that are left out with all that hangs from them.
+        cuts: Heights [m] at which a mesh's outline jumps; each slice between them becomes one box.
+        guards: Links whose shapes are in group 3, which viewers hide: they keep arms off the head.
     """
-    robot = ET.fromstring(urdf)
-    links = {joint.attrib["name"]: _ends(joint) for joint in robot.findall("joint")}
-    for missing in (joint for joint in joints if joint not in links):
-        raise ValueError(f"joint: got {missing!r}; valid is one of {', '.join(links)}.")
-    removed = {links[joint][1] for joint in joints}
-    while more := {child for parent, child in links.values() if parent in removed} - removed:
-        removed |= more
-    for element in list(robot):
-        gone = element.tag in ("gazebo", "transmission")
-        gone |= element.tag == "link" and element.attrib["name"] in removed
-        gone |= element.tag == "joint" and _ends(element)[1] in removed
-        if gone:
-            robot.remove(element)
-    return ET.tostring(robot, encoding="unicode")
+
+    title: str
+    licence: str
+    without: tuple[str, ...] = ()
+    cuts: dict[str, tuple[float, ...]] = field(default_factory=dict)
+    guards: tuple[str, ...] = ()
 
 
-def baxter_mjcf() -> str:
-    """The text of `baxter.xml`.
-
-    Masses, centres of mass, inertias, joint frames, ranges, damping and torque limits are those of
-    the URDF; links keep their names and are not fused. Geoms have no mass and touch nothing:
-    contact comes from the explicit `<pair>` elements of a scene.
-    """
-    robot = ET.fromstring(baxter_urdf())
-    shapes = copy.deepcopy(robot)
-    _use_primitives(shapes)
-    options = {"fusestatic": "false", "balanceinertia": "false"}
-    ET.SubElement(ET.SubElement(shapes, "mujoco"), "compiler", options)
-    spec = mujoco.MjSpec.from_string(ET.tostring(shapes, encoding="unicode"))
-    for body in spec.bodies:
-        for index, geom in enumerate(body.geoms):
-            geom.name = body.name if len(body.geoms) == 1 else f"{body.name}_{index}"
-    spec.compile()
-    mjcf = ET.fromstring(spec.to_xml())
-    _write_all_digits(mjcf, spec)
-    _dress(mjcf, robot)
-    ET.indent(mjcf)
-    header = HEADER.format(path=BAXTER, wheel=DESCRIPTIONS, version=version(DESCRIPTIONS))
-    return header + ET.tostring(mjcf, encoding="unicode") + "\n"
+RECIPES = {
+    "baxter": Recipe(
+        title="Rethink Robotics Baxter without its electric grippers",
+        licence="BSD",
+        without=GRIPPER_JOINTS,
+        cuts={"torso": (0.05, 0.21, 0.6, 0.71), "pedestal": (-0.642,)},
+        guards=("collision_head_link_1", "collision_head_link_2"),
+    ),
+    "panda": Recipe(
+        title="Franka Emika Panda without its hand",
+        licence="Apache-2.0",
+        without=("panda_hand_joint",),
+    ),
+    "ur5": Recipe(title="Universal Robots UR5", licence="BSD"),
+}
 
 
-def _use_primitives(robot: ET.Element) -> None:
-    """Leaves each link only primitive collision shapes: its own, else its visual's, else boxes."""
-    for link in robot.findall("link"):
-        visuals, collisions = link.findall("visual"), link.findall("collision")
-        shapes = [shape for shape in collisions if not _is_placeholder(shape)] or visuals
-        for shape in visuals + collisions:
-            link.remove(shape)
-        for shape in shapes:
-            if shape.find("geometry/mesh") is None:
-                ET.SubElement(link, "collision").extend(shape.findall("*"))
-            else:
-                link.extend(_boxes(shape, CUTS.get(link.attrib["name"], ())))
+def urdf_of(name: str) -> str:
+    """Text of the official URDF of a robot that ships, without what its recipe leaves out."""
+    return without_branches(_description(name).read_text(), RECIPES[name].without)
 
 
-def _is_placeholder(shape: ET.Element) -> bool:
-    sphere = shape.find("geometry/sphere")
-    return sphere is not None and float(sphere.attrib["radius"]) <= PLACEHOLDER
+def shipped_mjcf(name: str) -> str:
+    """The text of the MJCF file of a robot that ships."""
+    recipe, path = RECIPES[name], _description(name)
+    mjcf = mjcf_of(urdf_of(name), path, recipe.cuts)
+    for guard in recipe.guards:
+        for geom in mjcf.findall(f".//body[@name='{guard}']/geom"):
+            geom.set("group", "3")
+    header = HEADER.format(
+        title=recipe.title,
+        path=ROBOTS[name],
+        wheel=DESCRIPTIONS,
+        version=version(DESCRIPTIONS),
+        licence=recipe.licence,
+    )
+    return header + text(mjcf)
 
 
-def _boxes(shape: ET.Element, cuts: tuple[float, ...]) -> list[ET.Element]:
-    """Boxes along the link's axes around the slices of a mesh, rounded to 0.1 mm."""
-    mesh = shape.find("geometry/mesh")
-    assert mesh is not None
-    boxes = []
-    for low, high in zip((-np.inf, *cuts), (*cuts, np.inf), strict=True):
-        points = [
-            _slice(part.apply_transform(pose_of(shape)), low, high)
-            for part in read_mesh(mesh.attrib["filename"], scale_of(mesh))
-        ]
-        lower, upper = np.vstack(points).min(axis=0), np.vstack(points).max(axis=0)
-        box = ET.Element("collision")
-        ET.SubElement(box, "origin", xyz=_digits(np.round((lower + upper) / 2, 4)))
-        geometry = ET.SubElement(box, "geometry")
-        ET.SubElement(geometry, "box", size=_digits(np.round(upper - lower, 4)))
-        boxes.append(box)
-    return boxes
+def _description(name: str) -> Path:
+    description = ROBOTS[name]
+    assert description is not None
+    return description_path(description)
 
 
-def _slice(part: trimesh.Trimesh, low: float, high: float) -> NDArray[np.float64]:
-    """(n, 3) vertices of the part of a mesh between two heights [m]."""
-    vertices, faces = part.vertices, part.faces
-    for height, up in ((low, 1.0), (high, -1.0)):
-        if np.isfinite(height):
-            vertices, faces, *_ = slice_faces_plane(vertices, faces, (0, 0, up), (0, 0, height))
-    return vertices[np.unique(faces)]
-
-
-def _link_colors(robot: ET.Element) -> dict[str, tuple[float, ...]]:
-    """The URDF's colour of each link; a link without one has its parent's."""
-    colors = {link.attrib["name"]: rgba_of(link) for link in robot.findall("link")}
-    parents = {child: parent for parent, child in map(_ends, robot.findall("joint"))}
-
-    def inherited(link: str) -> tuple[float, ...]:
-        return colors[link] or (inherited(parents[link]) if link in parents else UNPAINTED)
-
-    return {link: inherited(link) for link in colors}
-
-
-def _dress(mjcf: ET.Element, robot: ET.Element) -> None:
-    """Adds what the URDF reader leaves out: default class, colours, speed limits and motors."""
-    worldbody = mjcf.find("worldbody")
-    assert worldbody is not None
-    mjcf.insert(list(mjcf).index(worldbody), ET.fromstring(DEFAULT))
-    worldbody[0].set("childclass", "baxter")
-    colors = _link_colors(robot)
-    for body in worldbody.iter("body"):
-        for geom in body.findall("geom"):
-            geom.set("rgba", _digits(colors[body.attrib["name"]]))
-            if body.attrib["name"] in GUARDS:
-                geom.set("group", "3")
-    motors = ET.SubElement(mjcf, "actuator")
-    for joint in worldbody.iter("joint"):
-        name = joint.attrib["name"]
-        limit = robot.find(f"joint[@name='{name}']/limit")
-        assert limit is not None
-        effort = float(limit.attrib["effort"])
-        joint.set("user", _digits([float(limit.attrib["velocity"])]))
-        ET.SubElement(motors, "motor", name=name, joint=name, ctrlrange=_digits([-effort, effort]))
-
-
-def _write_all_digits(mjcf: ET.Element, spec: mujoco.MjSpec) -> None:
-    """Puts the numbers of the spec in place of the rounded ones, inertias as the URDF has them."""
-    for tag, find in (("body", spec.body), ("joint", spec.joint), ("geom", spec.geom)):
-        for element in mjcf.findall(f"./worldbody//{tag}"):
-            source = find(element.attrib["name"])
-            for key in {"pos", "quat", "size", "range"} & element.attrib.keys():
-                count = len(element.attrib[key].split())
-                element.set(key, _digits(np.atleast_1d(getattr(source, key))[:count]))
-    for body in mjcf.findall("./worldbody//body"):
-        inertial, source = body.find("inertial"), spec.body(body.attrib["name"])
-        if inertial is not None:
-            inertial.attrib.clear()
-            inertial.set("pos", _digits(source.ipos))
-            inertial.set("mass", _digits([source.mass]))
-            inertial.set("fullinertia", _digits(source.fullinertia))
-
-
-def _digits(values: Iterable[float]) -> str:
-    """Shortest text that reads back as the same numbers."""
-    return " ".join(repr(float(value) + 0.0).removesuffix(".0") for value in values)
-
-
-def _ends(joint: ET.Element) -> tuple[str, str]:
-    """Names of the parent and the child link of a joint."""
-    parent, child = joint.find("parent"), joint.find("child")
-    assert parent is not None
-    assert child is not None
-    return parent.attrib["link"], child.attrib["link"]
+def main() -> None:
+    """Rewrites the files."""
+    for name in RECIPES:
+        Path(__file__).with_name(f"{name}.xml").write_text(shipped_mjcf(name))
 
 
 if __name__ == "__main__":
-    Path(__file__).with_name("baxter.xml").write_text(baxter_mjcf())
+    main()

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import fast_simplification
 import numpy as np
 import trimesh
 from numpy.typing import NDArray
 from trimesh.visual import TextureVisuals
 
-from assets import mesh_path
+from assets.packages import ModelError
 
 FACES_PER_MESH = 7_000
 """Triangle goal for one mesh file, missed where open borders are long; the pedestal had 74,707."""
@@ -22,29 +24,34 @@ CREASE = 0.6
 """Edges sharper than this [rad] stay sharp in the shading."""
 
 
-def read_mesh(uri: str, scale: tuple[float, ...]) -> list[trimesh.Trimesh]:
+def read_mesh(file: Path, scale: tuple[float, ...]) -> list[trimesh.Trimesh]:
     """Parts of a mesh file, one per material, in the mesh frame [m].
 
     The COLLADA unit is honoured. Its up axis is not, as in RViz: ROS meshes are in link axes
     whatever they declare (the torso, which says Y_UP, matches its Z_UP collision mesh unrotated).
 
     Raises:
-        ValueError: If the URI does not point into the installed descriptions.
-        FileNotFoundError: If the file is missing.
+        ModelError: The file holds no mesh that can be read.
     """
-    scene = trimesh.load_scene(mesh_path(uri))
+    try:
+        scene = trimesh.load_scene(file)
+    except Exception as error:  # each of trimesh's readers has its own
+        given = f"file {file.name} ({type(error).__name__}: {error})"
+        raise ModelError(given, "a mesh file that trimesh reads") from None
     to_metres = trimesh.units.unit_conversion(scene.units or "meters", "meters")
     parts = [part for part in scene.dump() if isinstance(part, trimesh.Trimesh)]
     for part in parts:
         part.apply_scale(np.multiply(scale, to_metres))
+    if not parts:
+        raise ModelError(f"file {file.name}, which holds no mesh", "a file with triangles")
     return parts
 
 
 def light_mesh(
-    uri: str, scale: tuple[float, ...], fallback: tuple[float, ...] | None
+    file: Path, scale: tuple[float, ...], fallback: tuple[float, ...] | None
 ) -> list[NDArray]:
     """Vertices, faces, normals and colours of a mesh file within the triangle budget."""
-    parts = read_mesh(uri, scale)
+    parts = read_mesh(file, scale)
     keep = FACES_PER_MESH / sum(len(part.faces) for part in parts)
     light = [_shaded(_decimated(part, keep)) for part in parts]
     rgba = [_part_rgba(part, fallback) for part in parts]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import xml.etree.ElementTree as ET
-from collections.abc import Collection
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 from functools import cache
 from importlib.metadata import version
@@ -14,8 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from assets import mesh_path
 from assets.cache import cached
+from assets.packages import named_file
 
 # What turns a mesh file into arrays: with another version of any of them the cache does not count.
 _MESH_READERS = ("fast-simplification", "pycollada", "trimesh")
@@ -48,26 +48,31 @@ class Visual:
         return sum(array.nbytes for array in arrays)
 
 
-def load_visuals(urdf: str, links: Collection[str] | None = None) -> list[Visual]:
+def load_visuals(
+    urdf: str, description: Path, links: Collection[str] | None = None
+) -> list[Visual]:
     """Visual meshes of all links that have one, in the order of the URDF.
 
     Args:
-        urdf: Text of the URDF, such as `assets.from_urdf.baxter_urdf()` returns.
+        urdf: Text of the URDF, such as `assets.from_urdf.urdf_of("baxter")` returns.
+        description: Its file, from which the mesh files are found.
         links: Names of the links that are wanted; None for all.
 
     Raises:
-        ValueError: If a mesh lies outside the installed descriptions.
-        FileNotFoundError: If a mesh file is missing.
+        ModelError: If a mesh is missing or lies outside the URDF's package.
     """
     visuals = []
-    for link in ET.fromstring(urdf).iter("link"):
+    robot = ET.fromstring(urdf)
+    named = named_colors(robot)
+    for link in robot.findall("link"):
         if links is not None and link.attrib["name"] not in links:
             continue
         for visual in link.iter("visual"):
             mesh = visual.find("geometry/mesh")
             if mesh is None:
                 continue
-            arrays = _light_mesh(mesh.attrib["filename"], scale_of(mesh), rgba_of(visual))
+            file = named_file(mesh.get("filename", ""), description)
+            arrays = _light_mesh(file, scale_of(mesh), rgba_of(visual, named))
             visuals.append(Visual(link.attrib["name"], pose_of(visual), *arrays))
     return visuals
 
@@ -89,10 +94,29 @@ def pose_of(element: ET.Element) -> NDArray[np.float64]:
     return pose
 
 
-def rgba_of(element: ET.Element) -> tuple[float, ...] | None:
-    """Colour in [0, 1] of the `<material>` below a link or visual; None if there is none."""
-    color = element.find(".//material/color")
-    return None if color is None else tuple(_numbers(color.attrib["rgba"]))
+def named_colors(robot: ET.Element) -> dict[str, tuple[float, ...]]:
+    """Colours in [0, 1] of the materials that a URDF has for all its links, by name."""
+    materials = {material.get("name", ""): material for material in robot.findall("material")}
+    colors = ((name, material.find("color")) for name, material in materials.items())
+    return {name: tuple(_numbers(c.attrib["rgba"])) for name, c in colors if c is not None}
+
+
+def rgba_of(
+    element: ET.Element, named: Mapping[str, tuple[float, ...]]
+) -> tuple[float, ...] | None:
+    """Colour in [0, 1] of the `<material>` below a link or visual; None if there is none.
+
+    Args:
+        element: The link or visual.
+        named: Colours of the materials that go by their name alone.
+    """
+    for material in element.iter("material"):
+        color = material.find("color")
+        if color is not None:
+            return tuple(_numbers(color.attrib["rgba"]))
+        if material.get("name") in named:
+            return named[material.attrib["name"]]
+    return None
 
 
 def scale_of(mesh: ET.Element) -> tuple[float, ...]:
@@ -102,19 +126,19 @@ def scale_of(mesh: ET.Element) -> tuple[float, ...]:
 
 @cache
 def _light_mesh(
-    uri: str, scale: tuple[float, ...], fallback: tuple[float, ...] | None
+    file: Path, scale: tuple[float, ...], fallback: tuple[float, ...] | None
 ) -> list[NDArray]:
     """Vertices, faces, normals and colours of a mesh file; from the cache, if it has them."""
     determined_by = [
-        mesh_path(uri).read_bytes(),
+        file.read_bytes(),
         Path(__file__).with_name("meshes.py").read_bytes(),
-        repr((uri, scale, fallback, [version(name) for name in _MESH_READERS])).encode(),
+        repr((file.suffix, scale, fallback, [version(name) for name in _MESH_READERS])).encode(),
     ]
 
     def make() -> list[NDArray]:
         from assets.meshes import light_mesh  # trimesh takes a third of a second to import
 
-        return light_mesh(uri, scale, fallback)
+        return light_mesh(file, scale, fallback)
 
     return cached(hashlib.sha256(b"".join(determined_by)).hexdigest(), make)
 

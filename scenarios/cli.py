@@ -74,13 +74,18 @@ class Run(Chosen):
     """What the synthesis minimises (see `fulcrum list`); the scenario's own if left out."""
 
     plan: str | None = None
-    """least-time: plan the tilt as `fulcrum plan` does, and execute that."""
+    """least-time, least-effort or friction-margin: plan the tilt as `fulcrum plan` does, and
+    execute that."""
 
     stretch: float = 1.0
     """By how much the planned duration is stretched."""
 
+    robust: bool = False
+    """The plan also serves the uncertainty set of controller robust, or as much as it can."""
+
     duration: float | None = None
-    """Duration of the tilt [s]; the scenario's own if left out."""
+    """Duration of the tilt [s], or the longest that a plan may take; the scenario's own if left
+    out."""
 
     seed: int = 0
     """Draws the small deviations of the start posture, and the world."""
@@ -137,19 +142,17 @@ class Run(Chosen):
         from sim.execution import planned_tilt
         from sim.preparation import Preparation
         from sim.run import Request
-        from sim.settings import stretched
+        from sim.settings import default_controller, stretched
         from synthesis.errors import InvalidInputError
 
         chosen = self.chosen()
-        planning, prepared = chosen_planning(self.plan, self.stretch), None
-        controller = "robust" if planning is None else "dynamic"
+        asked = self.plan, self.stretch, self.duration, self.robust
+        planning, prepared = chosen_planning(chosen, *asked), None
+        controller = default_controller(planning is not None)
         if self.controller is not None:
             controller = self.controller
         control = chosen_control(chosen, controller, self.objective)
         if planning is not None:
-            if self.duration is not None:
-                valid = "left out with --plan, which --stretch prolongs"
-                raise InvalidInputError("--duration", self.duration, valid)
             planned = planned_tilt(chosen, planning)
             chosen, prepared = planned.scenario, Preparation.of(planned)
         elif self.duration is not None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import itertools
+import math
 from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
 from datetime import datetime
@@ -72,14 +73,10 @@ def chosen_control(scenario: Scenario, controller: str, objective: str | None) -
     Raises:
         InvalidInputError: There is no such controller or objective.
     """
-    from sim.settings import controllers
-    from synthesis.errors import InvalidInputError
+    from sim.settings import controller as named
     from synthesis.problem import Objective
 
-    known = controllers(scenario.control)
-    if controller not in known:
-        raise InvalidInputError("--controller", controller, f"one of {', '.join(known)}")
-    control = known[controller]
+    control = named(scenario.control, controller, "--controller")
     if objective is None:
         return control
     return replace(control, objective=one_of(Objective, "--objective", objective))
@@ -98,22 +95,47 @@ def one_of(kind: type[Kind], option: str, text: str) -> Kind:
     return kind(text)
 
 
-def chosen_planning(plan: str | None, stretch: float) -> Planning | None:
+def chosen_planning(
+    scenario: Scenario, plan: str | None, stretch: float, duration: float | None, robust: bool
+) -> Planning | None:
     """How the tilt is planned; None if it is not.
 
     Raises:
-        InvalidInputError: There is no such plan, or none to be stretched.
+        InvalidInputError: There is no such plan, or none to be stretched or made robust.
     """
-    from sim.execution import LEAST_TIME, Planning
     from synthesis.errors import InvalidInputError
 
-    if plan is None:
-        if stretch != 1.0:
-            raise InvalidInputError("--stretch", stretch, f"given with --plan {LEAST_TIME}")
-        return None
-    if plan != LEAST_TIME:
-        raise InvalidInputError("--plan", plan, LEAST_TIME)
-    return Planning(stretch)
+    if plan is not None:
+        return asked_planning(scenario, "--plan", plan, stretch, duration, robust)
+    for option, given, default in (("--stretch", stretch, 1.0), ("--robust", robust, False)):
+        if given != default:
+            raise InvalidInputError(option, given, "given with --plan")
+    return None
+
+
+def asked_planning(
+    scenario: Scenario,
+    option: str,
+    objective: str,
+    stretch: float,
+    duration: float | None,
+    robust: bool,
+    points: int = 100,
+) -> Planning:
+    """A plan as it is asked for; with the scenario's own duration if the objective needs one.
+
+    Raises:
+        InvalidInputError: There is no such plan.
+    """
+    from sim.execution import Planning
+    from sim.settings import tilting
+    from synthesis.path_problem import PathObjective
+
+    kind = one_of(PathObjective, option, objective)
+    if duration is None:
+        own = sum(scenario.phases[i].duration_s for i in tilting(scenario.phases))
+        duration = own if kind.needs_duration else math.inf
+    return Planning(stretch, points, kind, duration, robust)
 
 
 class Move(Protocol):

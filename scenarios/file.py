@@ -17,7 +17,7 @@ from scenarios.file_errors import FileError, Source, explained, nearest
 from scenarios.file_keys import Table
 from scenarios.file_models import LiftedFile, ScenarioFile
 from scenarios.file_places import Places, vector
-from sim.scenario import Scenario, lifted
+from sim.scenario import Pivot, Scenario, lifted
 from sim.settings import HOLD, tilting
 
 SUFFIX = ".toml"
@@ -104,7 +104,11 @@ def _lifted(source: Source, table: LiftedFile, allowed: tuple[Path, ...]) -> Sce
     if "lifted_from" in open_source(other).data:
         raise source.error(key, f'"{table.lifted_from}"', "a scenario that is not lifted itself")
     scenario = lifted(read(other, allowed))
-    phases = scenario.phases
+    path, phases = scenario.path, scenario.phases
+    if not isinstance(path, Pivot):
+        raise source.error(
+            key, f'"{table.lifted_from}"', "a scenario whose path is a tilt or screw"
+        )
     if table.after == "hold":
         last = max(tilting(phases))
         phases = (*phases[: last + 1], *HOLD)
@@ -112,7 +116,7 @@ def _lifted(source: Source, table: LiftedFile, allowed: tuple[Path, ...]) -> Sce
         scenario,
         name=source.file.stem,
         summary=table.summary,
-        path=replace(scenario.path, travel=vector(table.travel_m)),
+        path=replace(path, travel=vector(table.travel_m)),
         phases=phases,
     )
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from scenarios.common import FAILED, PASSED, Chosen, one_of, results_folder
+from scenarios.common import FAILED, PASSED, Chosen, asked_planning, results_folder
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -52,17 +52,12 @@ class Plan(Chosen):
     tip_acceleration: float = math.inf
     """Largest acceleration of the hands' contacts [m/s^2]."""
 
-    mass: float = 0.0
-    """Share by which the mass may be lower or higher: timing and grip serve all of these sets."""
-
-    center: float = 0.0
-    """Offset of the centre of mass along each of the object's axes, either way [m]."""
-
-    friction: float = 0.0
-    """Share by which friction may be lower, on top of the friction factor."""
+    robust: bool = False
+    """The plan also serves the uncertainty set of controller robust, or as much as it can."""
 
     stretch: float = 1.0
-    """Then stretches the duration by this factor, with forces for the largest friction margin."""
+    """Then stretches the duration by this factor; after least-time with forces for the largest
+    friction margin."""
 
     out: Path | None = None
     """New or empty folder for plan.json and plan.png; logs/SCENARIO-plan-TIME if left out."""
@@ -71,21 +66,26 @@ class Plan(Chosen):
         """Does it; returns the exit code: 1 if there is no such plan."""
         from rich.console import Console
 
+        from sim.execution import made_plan
         from sim.files import write_json
-        from sim.plan import PlanError, plan
+        from sim.plan import PlanError
         from sim.plan_file import plan_content
         from sim.plan_picture import draw
-        from synthesis.uncertainty_set import UncertaintySet
 
         chosen = self.chosen()
-        objective, duration = self._asked(chosen)
+        planning = asked_planning(
+            chosen,
+            "--objective",
+            self.objective,
+            self.stretch,
+            self.duration,
+            self.robust,
+            self.points,
+        )
         margins = self._margins(chosen)
-        uncertainty = UncertaintySet(self.mass, (self.center,) * 3, self.friction)
         out = results_folder(self.out, f"{chosen.name}-plan")
         try:
-            planned = plan(chosen, margins, objective, duration, self.points, uncertainty)
-            if self.stretch != 1.0:
-                planned = planned.stretched(self.stretch)
+            planned = made_plan(chosen, margins, planning)
         except PlanError as error:
             print(error)
             return FAILED
@@ -95,17 +95,6 @@ class Plan(Chosen):
         _print(Console(highlight=False), planned)
         print(f"plan: {out / PLAN}")
         return PASSED
-
-    def _asked(self, chosen: Scenario) -> tuple:
-        """The objective and the longest duration [s]."""
-        from sim.settings import tilting
-        from synthesis.path_problem import PathObjective
-
-        objective = one_of(PathObjective, "--objective", self.objective)
-        if self.duration is not None:
-            return objective, self.duration
-        own = sum(chosen.phases[i].duration_s for i in tilting(chosen.phases))
-        return objective, own if objective.needs_duration else math.inf
 
     def _margins(self, chosen: Scenario) -> Margins:
         from sim.plan_problem import own_margins
@@ -139,6 +128,12 @@ def _print(console: Console, planned: Planned) -> None:
         f"at most {rate:.1f} deg/s; solved in {1e3 * found.solve_s:.0f} ms",
         soft_wrap=True,
     )
+    if (loads := len(found.problem.loads)) > 1:
+        console.print(
+            f"one grip for {loads} worlds: {100 * planned.share:.0f} % of the set of controller "
+            "robust",
+            soft_wrap=True,
+        )
     residuals = found.residuals
     console.print(
         f"limits and balance kept to {max(residuals.primal, 0.0):.1e}, optimal to "

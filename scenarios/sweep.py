@@ -46,10 +46,17 @@ class Sweep(Chosen):
     a plan those that count with inertia, else those that do not."""
 
     plan: str | None = None
-    """least-time: plan the tilt, and execute that in every world."""
+    """least-time, least-effort or friction-margin: plan the tilt, and execute that in every
+    world."""
 
     stretch: float = 1.0
     """By how much the planned duration is stretched."""
+
+    robust: bool = False
+    """The plan also serves the uncertainty set of controller robust, or as much as it can."""
+
+    duration: float | None = None
+    """The longest that a plan may take [s]; the scenario's own if left out."""
 
     grid: str = ""
     """What to set of every world drawn, like friction=0.7:1.3:7,weight=0.8,1.0,1.2 (factors)."""
@@ -77,7 +84,6 @@ class Sweep(Chosen):
         from sim.sweep.farm import Workers, run_sweep
         from sim.sweep.picture import draw_map
         from sim.sweep.store import MAP, SUMMARY, Store
-        from sim.sweep.summary import scores
 
         workers = Workers(self.workers, self.scheduler)
         try:
@@ -91,9 +97,9 @@ class Sweep(Chosen):
         before, started = len(store.missing()), time.perf_counter()
         try:
             with progress_bar(sweep.scenario.name) as move:
-                rows = run_sweep(
+                outcome = run_sweep(
                     sweep,
-                    store,
+                    folder,
                     workers,
                     lambda done, total, failures: move(
                         done, total, f"{done} of {total}, {failures} failed"
@@ -109,9 +115,8 @@ class Sweep(Chosen):
             )
             return INTERRUPTED
         minutes = (time.perf_counter() - started) / 60.0
-        hands = tuple(hand.name for hand in sweep.scenario.hands)
-        found = scores(rows, hands)
-        draw_map(rows, sweep, pair, store.folder / MAP)
+        found = outcome.scores
+        draw_map(outcome.rows, sweep, pair, store.folder / MAP)
         summary = {
             "scenario": sweep.scenario.name,
             "preset": self.preset,
@@ -142,7 +147,9 @@ class Sweep(Chosen):
         from sim.sweep.design import Sweep as Design
         from sim.sweep.parameters import parse_grid
 
-        chosen, planning = self.chosen(), chosen_planning(self.plan, self.stretch)
+        chosen = self.chosen()
+        asked = self.plan, self.stretch, self.duration, self.robust
+        planning = chosen_planning(chosen, *asked)
         if planning is not None:
             chosen = planned_tilt(chosen, planning).scenario
         if self.controllers is None:
@@ -180,8 +187,8 @@ class Sweep(Chosen):
         words = ["fulcrum", "sweep", *self.words]
         for field in dataclasses.fields(self):
             value = folder if field.name == "out" else getattr(self, field.name)
-            if field.name not in ("scenario", "allow_path") and value not in (None, ""):
-                words += [f"--{field.name}", str(value)]
+            if field.name not in ("scenario", "allow_path") and value not in (None, "", False):
+                words += [f"--{field.name}"] if value is True else [f"--{field.name}", str(value)]
         return shlex.join(words)
 
 

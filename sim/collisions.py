@@ -5,7 +5,7 @@ from __future__ import annotations
 import mujoco
 
 from sim.scenario import Scenario
-from sim.scene import unwanted_pairs
+from sim.scene import is_solid, unwanted_pairs
 
 DETECTION = 0.05
 """From where links look out for each other and for the scene [m]."""
@@ -49,7 +49,7 @@ def _between_links(
 ) -> list[tuple[Names, float]]:
     """Links that are not near one another in a chain, and their distances [m]."""
     surroundings = [g.name for g in (*scenario.object.geoms, *scenario.environment)]
-    names = [model.geom(g).name for g in range(model.ngeom)]
+    names = [g.name for g in map(model.geom, range(model.ngeom)) if is_solid(g)]
     links = [name for name in names if name not in surroundings]
     moving = [name for name in links if model.body_weldid[model.geom(name).bodyid[0]] != 0]
     fixed = [name for name in links if name not in moving]

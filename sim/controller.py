@@ -5,8 +5,6 @@ from __future__ import annotations
 import time
 from dataclasses import dataclass, replace
 
-import numpy as np
-
 from sim.channel import Channel, Setpoint
 from sim.clock import PathClock
 from sim.drives import Drives
@@ -16,7 +14,7 @@ from sim.health import Health, Sent
 from sim.ik import JointPath
 from sim.inertia import inertial_wrenches
 from sim.observer import PoseObserver
-from sim.path import ScrewPath
+from sim.path import object_path
 from sim.plant import Measurement
 from sim.references import References, Target
 from sim.replanning import Replanner
@@ -95,9 +93,9 @@ class Controller:
         """
         self._replanner, self._timestep = replanner, scenario.physics.timestep
         self._control, schedule = control, joint_path.schedule
-        self._scenario, self._robot, self._path = scenario, robot, ScrewPath(scenario.path)
+        self._scenario, self._robot, self._path = scenario, robot, object_path(scenario.path)
         self._references = References(joint_path, self._timestep)
-        self._free, self._held = schedule.free, schedule.held
+        self._free, self._held = schedule.free.tolist(), schedule.held.tolist()
         # Once the grip has been let go for good there is nothing left to be lowered.
         self._last_held = max(schedule.held.nonzero()[0].tolist(), default=-1)
         self._statics = Statics(scenario, control, robot, grip)
@@ -113,8 +111,6 @@ class Controller:
         self._failing_t: float | None = None
         self._heard_t = 0.0
         self._q_stop: Array | None = None
-        none = np.zeros(len(robot.joints))
-        self._sent = Sent(none, np.zeros(len(none), bool), none)
 
     @property
     def events(self) -> tuple[Event, ...]:
@@ -130,20 +126,20 @@ class Controller:
 
     def command(self, measurement: Measurement) -> Command:
         """The torques for the next step."""
-        t, seen = measurement.t, self._health.accept(measurement)
-        mode = self._supervisor.mode
-        path_t = self._clock.at(t, self._supervisor.rate)
+        supervisor, clock, drives = self._supervisor, self._clock, self._drives
+        t, seen, mode = measurement.t, self._health.accept(measurement), supervisor.mode
+        path_t = clock.at(t, supervisor.rate)
         target = self._references.at(path_t)
-        if self._clock.rate != 1.0 or self._clock.change != 0.0:
-            target = target.on_clock(self._clock.rate, self._clock.change)
-        if self._supervisor.stands:
+        if clock.rate != 1.0 or clock.change != 0.0:
+            target = target.on_clock(clock.rate, clock.change)
+        if supervisor.stands:
             self._q_stop = seen.q if self._q_stop is None else self._q_stop
             target = Target(target.phase, target.tilt, target.grip, self._q_stop, 0.0 * target.qd)
-        synthesis_s, failed, free = 0.0, False, bool(self._free[target.phase])
+        synthesis_s, failed, free = 0.0, False, self._free[target.phase]
         if free:
             self._failing_t, self._heard_t = None, t
         if self._tick % self._control.solve_every == 0:
-            self._drives.update_model(seen.q, target if self._control.inertia else None)
+            drives.update_model(seen.q, target if self._control.inertia else None)
             if not free and self._health.sees_object(seen):
                 started = time.perf_counter()
                 forces = self._synthesize(seen, target)
@@ -157,9 +153,8 @@ class Controller:
         if self._tick % self._check_every == 0:
             self._check(seen, path_t, target)
         self._tick += 1
-        share = target.grip * self._supervisor.grip(t) if self._control.feedforward else 0.0
-        tau, saturated = self._drives.torques(seen, target, share, self._health.uncontrolled)
-        self._sent = Sent(tau, saturated, self._drives.tau_pull)
+        share = target.grip * supervisor.grip(t) if self._control.feedforward else 0.0
+        tau, saturated = drives.torques(seen, target, share, self._health.uncontrolled)
         return Command(
             tau=tau,
             saturated=saturated,
@@ -168,7 +163,7 @@ class Controller:
             mode=mode,
             tilt_ref=target.tilt,
             rate_ref=target.rate,
-            w_OC_C=self._drives.w_held,
+            w_OC_C=drives.w_held,
             synthesis_s=synthesis_s,
             failed=failed,
         )
@@ -185,11 +180,12 @@ class Controller:
             self._drives.recall(path_t)
 
     def _check(self, seen: Measurement, path_t: float, target: Target) -> None:
+        drives = self._drives
         findings = self._health.check(
             seen,
             target,
-            self._sent,
-            held=bool(self._held[target.phase]),
+            Sent(drives.tau, drives.saturated, drives.tau_pull),
+            held=self._held[target.phase],
             failing_s=0.0 if self._failing_t is None else seen.t - self._failing_t,
             silent_s=seen.t - self._heard_t,
         )

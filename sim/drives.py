@@ -44,6 +44,8 @@ class Drives:
     Attributes:
         tau_g: Torques that hold the robot up, and where inertia counts also make its motion, as of
             the last update of the model (l,).
+        tau: Torques that were last asked for, within the limits (l,).
+        saturated: Which of them were cut at their limit, (l,).
         tau_pull: Torques with which the impedance last pulled the joints to their path (l,).
         w_held: Wrenches on the object that the last torques were to make [N, N·m], (m, 6).
     """
@@ -52,14 +54,15 @@ class Drives:
         """Takes over the model of the robot, which whoever updates it shares."""
         self._robot, self._control = robot, control
         joints = len(robot.joints)
-        self.tau_g, self.tau_pull = np.zeros((2, joints))
+        self.tau_g, self.tau_pull, self.tau = np.zeros((3, joints))
+        self.saturated = np.zeros(joints, bool)
         contacts, hands = len(scenario.contact_names), len(scenario.hands)
         none = np.zeros(joints), np.zeros((contacts, 6)), np.zeros((hands, 6, joints))
         self._setpoint = Setpoint(*none)
         self._share, self._tau_held, self.w_held = math.nan, self.tau_g, self._setpoint.w_OC_C
         # Deviations of angles and speeds, and torques per each of them: both terms in one product.
-        self._deviation, self._gains = np.zeros((2, joints)), np.zeros((joints, 2, joints))
-        self._sent = np.zeros(joints)
+        self._deviations, self._gains = np.zeros(2 * joints), np.zeros((joints, 2 * joints))
+        self._q_off, self._qd_off = self._deviations[:joints], self._deviations[joints:]
         self._reaction, self._extra = GripReaction(scenario, control, robot), 0.0
         self._update_s = control.solve_every * scenario.physics.timestep
         # Setpoints by path time, in the order of both.
@@ -81,7 +84,8 @@ class Drives:
         )
         if self._control.yielding_squeeze:
             mass_matrix = self._without_squeeze(mass_matrix)
-        self._gains[:, 0], self._gains[:, 1] = self._reaction.braced(mass_matrix, omega)
+        stiffness, damping = self._reaction.braced(mass_matrix, omega)
+        self._gains[:, : len(q)], self._gains[:, len(q) :] = stiffness, damping
         self.tau_g = self._robot.gravity()
         if target is not None and target.qdd is not None:
             self.tau_g = self.tau_g + self._robot.motion_torques(target.qd, target.qdd)
@@ -131,29 +135,31 @@ class Drives:
             share: Of the setpoint's forces that is applied [-].
             dead: Joints without impedance, (l,); None if there are none.
         """
-        np.subtract(target.q, measurement.q, self._deviation[0])
-        np.subtract(target.qd, measurement.qd, self._deviation[1])
+        np.subtract(target.q, measurement.q, self._q_off)
+        np.subtract(target.qd, measurement.qd, self._qd_off)
         if dead is not None:
-            self._deviation[:, dead] = 0.0
-        pull = self._gains.reshape(len(target.q), -1).dot(self._deviation.reshape(-1))
+            self._q_off[dead] = self._qd_off[dead] = 0.0
+        pull = self._gains.dot(self._deviations)
         if dead is not None:
             pull[dead] = 0.0
         self.tau_pull = pull
-        tau = pull + self._robot.damping * target.qd
-        tau += self._held(share)
-        if math.isnan(tau.dot(tau)):  # a limit cuts infinities, but lets NaN pass
-            tau = np.where(np.isnan(tau), self._sent, tau)
-        self._sent = limited = np.minimum(np.maximum(tau, self._robot.tau_min), self._robot.tau_max)
-        return limited, limited != tau
-
-    def _held(self, share: float) -> Array:
-        """Torques that hold robot and object, as until the next setpoint or change of share."""
         if share != self._share:
-            self._share = share
-            self._tau_held = self.tau_g + share * self._setpoint.tau_f
-            self.w_held = share * self._setpoint.w_OC_C
-            if self._extra > 0.0:
-                squeeze = share * self._extra * self._reaction.direction
-                self._tau_held += squeeze @ self._setpoint.J_C[:, N]
-                self.w_held[: len(squeeze), N] += squeeze
-        return self._tau_held
+            self._hold(share)
+        robot = self._robot
+        tau = pull + robot.damping * target.qd
+        tau += self._tau_held
+        if math.isnan(tau.dot(tau)):  # a limit cuts infinities, but lets NaN pass
+            tau = np.where(np.isnan(tau), self.tau, tau)
+        self.tau = np.minimum(np.maximum(tau, robot.tau_min), robot.tau_max)
+        self.saturated = self.tau != tau
+        return self.tau, self.saturated
+
+    def _hold(self, share: float) -> None:
+        """Finds what holds robot and object until the next setpoint or change of share."""
+        self._share = share
+        self._tau_held = self.tau_g + share * self._setpoint.tau_f
+        self.w_held = share * self._setpoint.w_OC_C
+        if self._extra > 0.0:
+            squeeze = share * self._extra * self._reaction.direction
+            self._tau_held += squeeze @ self._setpoint.J_C[:, N]
+            self.w_held[: len(squeeze), N] += squeeze

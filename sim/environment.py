@@ -11,7 +11,7 @@ from dm_env import specs
 
 from sim.checks import positive
 from sim.ik import plan_joints
-from sim.path import ScrewPath
+from sim.path import object_path
 from sim.plant import Plant
 from sim.robot import RobotModel
 from sim.scenario import Scenario
@@ -38,7 +38,7 @@ class TiltTask(control.Task):
 
     def __init__(self, scenario: Scenario, plant: Plant, seed: int) -> None:
         self._plant = plant
-        self._path = ScrewPath(scenario.path)
+        self._path = object_path(scenario.path)
         self._robot = RobotModel(scenario)
         self._start = plan_joints(scenario).start
         self._deviation = self._robot.start_deviation

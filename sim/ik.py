@@ -15,9 +15,9 @@ from scipy.spatial.transform import Rotation
 from assets import velocity_limits
 from sim.collisions import DETECTION, collision_pairs, distance
 from sim.contacts import ContactFrames
-from sim.path import ScrewPath
+from sim.path import object_path
 from sim.scenario import Scenario
-from sim.scene import ObjectMotion, compose, tip_geom, tip_site
+from sim.scene import ObjectMotion, compose, joint_ranges, tip_geom, tip_site
 from sim.schedule import Schedule
 from synthesis import FulcrumError, InvalidInputError
 from synthesis.contact import Array
@@ -148,7 +148,7 @@ class _Target(NamedTuple):
 
 class _Follower:
     def __init__(self, scenario: Scenario, solved: float, grid: Grid) -> None:
-        self._scenario, self._path = scenario, ScrewPath(scenario.path)
+        self._scenario, self._path = scenario, object_path(scenario.path)
         self._solved, self._grid = solved, grid
         self._done, self._steps = 0, 1
         self._schedule = Schedule(scenario)
@@ -192,7 +192,7 @@ class _Follower:
         self._configuration.update(holding)
         planned += [self._follow(i) for i in range(touched + 1, len(phases))]
         progress, q = zip(*planned, strict=True)
-        low, high = self._model.jnt_range[self._motor_joints].T
+        low, high = joint_ranges(self._model)[self._motor_joints].T
         every = np.concatenate(q)
         clearance = np.minimum(every - low, high - every).min(axis=0)
         return JointPath(self._schedule, tuple(progress), tuple(q), clearance)
@@ -279,7 +279,7 @@ class _Follower:
         model, data, q = self._model, self._configuration.data, self._configuration.q
         reasons = []
         for j in range(model.njnt):
-            name, (low, high) = model.joint(j).name, model.jnt_range[j]
+            name, (low, high) = model.joint(j).name, joint_ranges(model)[j]
             unit = "m" if model.jnt_type[j] == mujoco.mjtJoint.mjJNT_SLIDE else "rad"
             if too_fast[j]:
                 reasons.append(f"{name} at its speed limit {self._qd_max[j]:g} {unit}/s")

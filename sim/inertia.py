@@ -9,12 +9,12 @@ from __future__ import annotations
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from sim.path import ScrewPath
+from sim.path import ObjectPath
 from sim.scenario import Scenario
 from synthesis.contact import Array
 
 
-def inertial_wrenches(scenario: Scenario, path: ScrewPath, tilt: float) -> tuple[Array, Array]:
+def inertial_wrenches(scenario: Scenario, path: ObjectPath, tilt: float) -> tuple[Array, Array]:
     r"""Wrenches in the object's frame per :math:`\ddot\theta` and :math:`\dot\theta^2`, (6,) each.
 
     Args:
@@ -27,10 +27,10 @@ def inertial_wrenches(scenario: Scenario, path: ScrewPath, tilt: float) -> tuple
     R_OI = Rotation.from_quat(thing.principal_axes, scalar_first=True).as_matrix()
     R_WO, _ = path.pose(tilt)
     slope, curvature = path.derivatives(tilt, center)
-    omega = R_WO.T @ path.axis
+    omega, alpha = R_WO.T @ path.axis(tilt), R_WO.T @ path.axis_slope(tilt)
     f_a, f_b = thing.mass * R_WO.T @ slope, thing.mass * R_WO.T @ curvature
     m_a = R_OI @ (moments * (omega @ R_OI))
-    m_b = np.cross(omega, m_a)
+    m_b = R_OI @ (moments * (alpha @ R_OI)) + np.cross(omega, m_a)
     return (
         np.concatenate([f_a, m_a + np.cross(center, f_a)]),
         np.concatenate([f_b, m_b + np.cross(center, f_b)]),

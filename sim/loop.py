@@ -13,7 +13,7 @@ from sim.controller import Controller
 from sim.grip import GripSchedule
 from sim.guard import Event
 from sim.ik import JointPath, plan_joints
-from sim.path import ScrewPath
+from sim.path import object_path
 from sim.plant import Measurement, Plant
 from sim.replanning import Replanner
 from sim.robot import RobotModel
@@ -74,7 +74,7 @@ class ClosedLoop:
             RobustInfeasibleError: No grip holds even the nominal object somewhere on the path.
             DivergedError: The start's state is more than numbers can hold.
         """
-        self._path = ScrewPath(scenario.path)
+        self._path = object_path(scenario.path)
         self.robot = robot = RobotModel(scenario)
         joint_path = joint_path or plan_joints(scenario)
         self.truth = world.truth(truth or scenario)

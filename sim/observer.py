@@ -1,6 +1,6 @@
 r"""Where the object is: measurements, smoothed along the path that it is on.
 
-Between ticks the estimate is carried on by the path's screw; then it goes a share
+Between ticks the estimate is carried on as the path moves; then it goes a share
 :math:`\alpha = 1 - e^{-T / \tau}` of the way to the measurement, T after the last one. What is
 smoothed is the deviation from the path alone, so that the estimate does not lag behind the motion.
 """
@@ -12,19 +12,19 @@ import math
 import mujoco
 import numpy as np
 
-from sim.path import ScrewPath
+from sim.path import ObjectPath
 from synthesis.contact import Array
 
 
 class PoseObserver:
     """Smooths the measured pose with a time constant; with none it hands it on."""
 
-    def __init__(self, path: ScrewPath, time_constant: float) -> None:
+    def __init__(self, path: ObjectPath, time_constant: float) -> None:
         """Takes the path, and the time constant [s]."""
         self._path, self._tau = path, time_constant
         self._t, self._tilt = math.nan, 0.0
         self._p_WO, self._quat_WO = np.zeros(3), np.zeros(4)
-        self._turn, self._rotvec = np.zeros(4), np.zeros(3)
+        self._rotvec = np.zeros(3)
 
     def update(self, t: float, p_WO: Array, quat_WO: Array, tilt_ref: float) -> tuple[Array, Array]:
         """The estimate of position, (3,), and orientation, (4,).
@@ -41,21 +41,13 @@ class PoseObserver:
             self._p_WO, self._quat_WO = p_WO, quat_WO
         else:
             share = 1.0 - math.exp((self._t - t) / self._tau)
-            self._carry_on(tilt_ref)
+            self._p_WO, self._quat_WO = self._path.carry(
+                self._tilt, tilt_ref, self._p_WO, self._quat_WO
+            )
             self._p_WO = self._p_WO + share * (p_WO - self._p_WO)
             self._correct(quat_WO, share)
         self._t, self._tilt = t, tilt_ref
         return self._p_WO, self._quat_WO
-
-    def _carry_on(self, tilt: float) -> None:
-        """Moves the estimate along the path to a tilt [rad]."""
-        path, quaternion, arm = self._path, np.empty(4), np.empty(3)
-        mujoco.mju_axisAngle2Quat(self._turn, path.axis, tilt - self._tilt)
-        mujoco.mju_mulQuat(quaternion, self._turn, self._quat_WO)
-        # The axis travels with the object.
-        before, after = path.point + self._tilt * path.advance, path.point + tilt * path.advance
-        mujoco.mju_rotVecQuat(arm, self._p_WO - before, self._turn)
-        self._p_WO, self._quat_WO = after + arm, quaternion
 
     def _correct(self, quat_WO: Array, share: float) -> None:
         """Turns the estimate a share of the way to a measured orientation."""

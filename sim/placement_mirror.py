@@ -8,13 +8,15 @@ import mujoco
 import numpy as np
 
 from sim.contacts import ContactFrames
-from sim.path import ScrewPath, rotation
+from sim.path import ObjectPath, object_path
 from sim.scenario import Hand, Scenario, Vector
 from sim.scene import compose, hand_body
 from synthesis.contact import Array
 
 # Descriptions give frames in rounded numbers [m, and sines].
 _ALIKE = 1e-3
+# Tilts at which the path is looked at.
+_LOOKS = 7
 
 
 @dataclass(frozen=True, eq=False)
@@ -69,18 +71,16 @@ def find_mirror(scenario: Scenario) -> Mirror | None:
     if len(scenario.hands) != 2:
         return None
     first, second = scenario.hands
-    path, frames = ScrewPath(scenario.path), ContactFrames(scenario)
+    path, frames = object_path(scenario.path), ContactFrames(scenario)
     R_WO, p_WO = path.pose(0.0)
     points = frames.points(R_WO, p_WO)[:2]
     across, normal = points[0] - points[1], np.zeros(3)
     normal[int(np.abs(across).argmax())] = 1.0
     center = points.mean(axis=0)
-    R_OW = rotation(scenario.path.start).as_matrix().T
+    normal_O, point_O = R_WO.T @ normal, R_WO.T @ (center - p_WO)
     p = np.asarray(scenario.object.center_of_mass)
-    normal_O, point_O = R_OW @ normal, R_OW @ (center - p_WO)
-    upright = abs(normal[2]) < _ALIKE and np.abs(np.cross(path.axis, normal)).max() < _ALIKE
-    flat = abs(path.advance @ normal) < _ALIKE and abs(normal_O @ (p - point_O)) < _ALIKE
-    if not (upright and flat and first.friction == second.friction):
+    flat = abs(normal[2]) < _ALIKE and abs(normal_O @ (p - point_O)) < _ALIKE
+    if not (flat and first.friction == second.friction and _stays(path, normal)):
         return None
     mirror = Mirror((first, second), normal, center, normal_O, point_O, {})
     images = (
@@ -93,6 +93,16 @@ def find_mirror(scenario: Scenario) -> Mirror | None:
     if joints is None:
         return None
     return Mirror((first, second), normal, center, normal_O, point_O, joints)
+
+
+def _stays(path: ObjectPath, normal: Array) -> bool:
+    """Whether the object neither leaves a plane with that normal nor turns out of it."""
+    start = path.pose(0.0)[1] @ normal
+    for tilt in np.linspace(0.0, path.end, _LOOKS):
+        aside = path.pose(float(tilt))[1] @ normal - start
+        if abs(aside) > _ALIKE or np.abs(np.cross(path.axis(float(tilt)), normal)).max() > _ALIKE:
+            return False
+    return True
 
 
 def _images(

@@ -12,12 +12,12 @@ from scipy.spatial.transform import Rotation
 
 from sim.collisions import Names, distance, overlapping_links
 from sim.ik import Grid, PathError, plan_joints
-from sim.path import ScrewPath
+from sim.path import object_path
 from sim.placement_freedom import rounded, with_posture
 from sim.poses import PathProblems
 from sim.robot import RobotModel
 from sim.scenario import Scenario
-from sim.scene import ObjectMotion, compose
+from sim.scene import ObjectMotion, compose, is_solid
 from sim.settings import Control
 from synthesis import InfeasibleError, Objective, SolverError, Synthesizer, UnboundedError
 from synthesis.contact import Array
@@ -63,6 +63,8 @@ FULL = Steps(Grid(), solved=1e-9, tilt_deg=5.0, room=0.0)
 _OVERLAPS, _OUT_OF_REACH, _STUCK, _CRAMPED, _WITHOUT_FORCES = 5.0, 4.0, 3.0, 2.0, 1.0
 # Feasible placements cost less than this.
 _FEASIBLE = 0.999
+# The range of joints that have none [rad].
+_TURN = 2.0 * math.pi
 # Clearance of the robots' fixed parts [m].
 CLEARANCE = 0.005
 # Tilts at which the object's distance to them is taken.
@@ -127,10 +129,10 @@ def assess(
             return Value(_OUT_OF_REACH + error.error / (1.0 + error.error), f"{error}")
         return Value(_STUCK + 1.0 - error.share, f"{error}")
     robot = RobotModel(scenario)
-    room = joint_path.clearance / (robot.q_max - robot.q_min)
-    tight = int(room.argmin())
-    if room[tight] < steps.room:
-        cost = _CRAMPED + 1.0 - float(room[tight]) / steps.room
+    kept = steps.room * np.minimum(robot.q_max - robot.q_min, _TURN)
+    tight = int((joint_path.clearance - kept).argmin())
+    if joint_path.clearance[tight] < kept[tight]:
+        cost = _CRAMPED + 1.0 - max(0.0, float(joint_path.clearance[tight] / kept[tight]))
         return Value(cost, f"{robot.joints[tight]} within {100 * steps.room:g} % of its limit")
     margins = believed(control, scenario)
     problems = PathProblems(scenario, margins, joint_path=joint_path)
@@ -240,9 +242,11 @@ def _depths(scenario: Scenario) -> dict[Names, float]:
     fixed = [
         g
         for g in range(model.ngeom)
-        if model.body_weldid[model.geom_bodyid[g]] == 0 and model.geom(g).name not in names
+        if model.body_weldid[model.geom_bodyid[g]] == 0
+        and model.geom(g).name not in names
+        and is_solid(model.geom(g))
     ]
-    path, thing = ScrewPath(scenario.path), model.body(scenario.object.name).mocapid[0]
+    path, thing = object_path(scenario.path), model.body(scenario.object.name).mocapid[0]
     depths: dict[Names, float] = {}
     for tilt in np.linspace(0.0, path.end, _LOOKS):
         R_WO, data.mocap_pos[thing] = path.pose(float(tilt))

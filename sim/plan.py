@@ -16,9 +16,9 @@ from sim.scenario import Scenario
 from synthesis import FulcrumError, InvalidInputError
 from synthesis.contact import Array
 from synthesis.errors import InfeasiblePathError
+from synthesis.path_loads import solve_many
 from synthesis.path_problem import PathObjective, PathProblem
 from synthesis.path_solution import PathSolution
-from synthesis.path_synthesizer import solve_path
 from synthesis.uncertainty_set import UncertaintySet
 
 # What the solver's accuracy may add to a limit that a plan uses up, as a share of it [-].
@@ -80,6 +80,7 @@ class Plan:
         joints: Names of the joints.
         solution: Timing and forces; its path coordinate is the share of the tilt.
         q: Joint angles over that share.
+        share: How much it serves of the uncertainty that was asked for [-]; 1 is all of it.
     """
 
     scenario: Scenario
@@ -87,6 +88,7 @@ class Plan:
     joints: tuple[str, ...]
     solution: PathSolution
     q: BSpline
+    share: float = 1.0
 
     @cached_property
     def tilt(self) -> Array:
@@ -156,14 +158,14 @@ class Plan:
             tau=tau[first] + part[:, None] * (tau[second] - tau[first]),
         )
 
-    def stretched(
-        self, factor: float, objective: PathObjective = PathObjective.FRICTION_MARGIN
-    ) -> Plan:
+    def stretched(self, factor: float) -> Plan:
         """The same motion in ``factor`` times the duration, with forces of its own.
+
+        They are best for the plan's objective; of a plan in least time they have the largest
+        friction margin.
 
         Args:
             factor: > 0; below 1 the motion is faster.
-            objective: What the forces are best for.
 
         Raises:
             PlanError: There are none, as where statics has none and only speed helps; says where.
@@ -171,7 +173,9 @@ class Plan:
         positive("stretch", factor)
         what = f"a tilt in {self.duration * factor:.3g} s"
         self._check_speeds(factor, what)
-        timing = self.solution.b / factor**2
+        timing, objective = self.solution.b / factor**2, self.solution.problem.objective
+        if objective is PathObjective.LEAST_TIME:
+            objective = PathObjective.FRICTION_MARGIN
         problem = replace(
             self.solution.problem, timing=timing, duration=math.inf, objective=objective
         )
@@ -190,6 +194,11 @@ class Plan:
         if broken:
             worst = max(broken, key=lambda name: broken[name][0])
             raise PlanError(self.scenario.name, what, [(worst, broken[worst][1])])
+
+    def _repr_markdown_(self) -> str:
+        from sim.notebook import plan_markdown
+
+        return plan_markdown(self)
 
 
 def plan(
@@ -233,7 +242,7 @@ def plan(
 
 def _solve(scenario: Scenario, problem: PathProblem, what: str) -> PathSolution:
     try:
-        return solve_path(problem)
+        return solve_many(problem)
     except InfeasiblePathError as error:
         binding = [(name, s * scenario.path.angle_deg) for name, s in error.binding]
         raise PlanError(scenario.name, what, binding) from error

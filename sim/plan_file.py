@@ -23,6 +23,8 @@ def plan_content(plan: Plan) -> dict[str, Any]:
         "objective": problem.objective.value,
         "value": found.value,
         "duration_s": plan.duration,
+        "loads": len(problem.loads),
+        "share_of_uncertainty": plan.share,
         "margins": dataclasses.asdict(plan.margins),
         "residuals": dataclasses.asdict(found.residuals),
         "solver": {"solve_s": found.solve_s, "iterations": found.iterations},

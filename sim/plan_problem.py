@@ -11,11 +11,12 @@ from scipy.interpolate import BSpline, make_interp_spline
 from scipy.spatial.transform import Rotation
 
 from sim.checks import not_negative, positive
+from sim.contacts import contacts
 from sim.ik import JointPath, plan_joints
 from sim.inertia import inertial_wrenches
-from sim.path import ScrewPath
+from sim.path import ObjectPath, object_path
 from sim.robot import RobotModel
-from sim.scenario import Scenario
+from sim.scenario import Object, Scenario
 from sim.settings import Control
 from sim.statics import Statics, gravity
 from synthesis import InvalidInputError, Problem
@@ -82,48 +83,47 @@ def path_problem(
         scenario: The scene, whose path the arms follow.
         margins: What to keep clear of.
         points: Grid points.
-        uncertainty: By how much the world may differ: one timing and one grip serve all of the
-            set. Its share of friction comes on top of the margins' factor. The first load is the
-            scenario itself, with the set's friction.
+        uncertainty: By how much the world may differ from the scenario with its true friction:
+            one timing and one grip serve all of the set, and the scenario itself with the margins'
+            friction factor, which is the first load.
         start: Share of the tilt at which the path begins [-].
         curve: The joint angles, where they are known already.
 
     Raises:
         PathError: The arms cannot follow the path.
     """
-    robot, path = RobotModel(scenario), ScrewPath(scenario.path)
+    robot, path = RobotModel(scenario), object_path(scenario.path)
+    gripped = _gripped(scenario, margins.grip_max)
     control = Control(friction_factor=margins.friction_factor, preload=margins.grip_min)
-    nominal = UncertaintySet(friction=uncertainty.friction)
-    sets = [(scenario, nominal)]
-    if replace(uncertainty, friction=0.0) != CERTAIN:
-        # What is left of the set at the corners of mass and centre of mass.
-        rest = replace(uncertainty, mass=0.0, center=(0.0, 0.0, 0.0))
-        sets += [(corner, rest) for corner in _corners(scenario, uncertainty)]
-    worlds = [_gripped(world, margins.grip_max) for world, _ in sets]
-    statics = [Statics(world, control, robot) for world in worlds]
+    believed = Statics(gripped, control, robot)
+    true = contacts(gripped, replace(control, friction_factor=1.0))
+    corners = [] if uncertainty == CERTAIN else _corners(scenario.object, uncertainty)
+    placed: tuple[Problem, ...] = ()
     if curve is None:
         curve = tilting_curve(plan_joints(scenario, _SOLVED))
     s = np.linspace(start, 1.0, points)
     q, slope, curvature = curve(s), curve(s, 1), curve(s, 2)
-    problems: list[list[tuple[Problem, ...]]] = [[] for _ in worlds]
+    problems: list[list[Problem]] = []
     torques = np.empty((2, *q.shape))
     for k in range(points):
         robot.update(q[k])
         torques[:, k] = robot.inertial_torques(slope[k], curvature[k])
         R_WO, p_WO = path.pose(path.end * s[k])
         quaternion = Rotation.from_matrix(R_WO).as_quat(scalar_first=True)
-        for i, world in enumerate(worlds):
-            at_rest = statics[i].problem(p_WO, quaternion, path.end * s[k])
-            limited = _within(at_rest, margins.limits)
-            problems[i].append(sets[i][1].worlds(limited, gravity(world.object, R_WO)))
-    wrenches = [[inertial_wrenches(world, path, path.end * x) for x in s] for world in worlds]
+        at_rest = believed.problem(p_WO, quaternion, path.end * s[k])
+        problems.append([_within(at_rest, margins.limits)])
+        if corners:
+            placed = uncertainty.placed(replace(problems[k][0], contacts=true))
+            weights = [gravity(corner, R_WO).wrench_O for corner in corners]
+            problems[k] += [replace(p, w_ext_O=w) for w in weights for p in placed]
     rates, accelerations = _tips(scenario, margins, path, s)
+    inertia = [_inertia(scenario, thing, path, s) for thing in (scenario.object, *corners)]
+    inertia[1:] = [each for each in inertia[1:] for _ in placed]
     problem = PathProblem(
         s=s,
         loads=tuple(
-            Load(along_path, path.end * per_a, path.end**2 * per_b)
-            for i, (per_a, per_b) in enumerate(np.array(wrenches).swapaxes(1, 2))
-            for along_path in zip(*problems[i], strict=True)
+            Load(along_path, w_a_O, w_b_O)
+            for along_path, (w_a_O, w_b_O) in zip(zip(*problems, strict=True), inertia, strict=True)
         ),
         inertial_torques=InertialTorques(torques[0], torques[1], slope * robot.damping),
         rates=Rates(
@@ -136,19 +136,24 @@ def path_problem(
     return problem, curve, robot.joints
 
 
-def _corners(scenario: Scenario, uncertainty: UncertaintySet) -> list[Scenario]:
-    """The scenario with every extreme of mass and centre of mass."""
-    thing = scenario.object
+def _corners(thing: Object, uncertainty: UncertaintySet) -> list[Object]:
+    """The object with every extreme of mass and centre of mass."""
     shares = {1.0 - uncertainty.mass, 1.0 + uncertainty.mass}
     places = [
         {place - offset, place + offset}
         for place, offset in zip(thing.center_of_mass, uncertainty.center, strict=True)
     ]
-    corners = []
-    for share, x, y, z in itertools.product(sorted(shares), *map(sorted, places)):
-        other = replace(thing.weighing(share), center_of_mass=(x, y, z))
-        corners.append(replace(scenario, object=other))
-    return corners
+    return [
+        replace(thing.weighing(share), center_of_mass=(x, y, z))
+        for share, x, y, z in itertools.product(sorted(shares), *map(sorted, places))
+    ]
+
+
+def _inertia(scenario: Scenario, thing: Object, path: ObjectPath, s: Array) -> tuple[Array, Array]:
+    """Wrenches that accelerate an object, by the share's acceleration and squared rate, (K, 6)."""
+    world = replace(scenario, object=thing)
+    wrenches = np.array([inertial_wrenches(world, path, path.end * x) for x in s])
+    return path.end * wrenches[:, 0], path.end**2 * wrenches[:, 1]
 
 
 def _gripped(scenario: Scenario, grip_max: float) -> Scenario:
@@ -187,7 +192,7 @@ def _within(problem: Problem, share: float) -> Problem:
 
 
 def _tips(
-    scenario: Scenario, margins: Margins, path: ScrewPath, s: Array
+    scenario: Scenario, margins: Margins, path: ObjectPath, s: Array
 ) -> tuple[Rates, Accelerations]:
     """Speeds and accelerations of the hands' contacts, which go with the object."""
     places = [np.asarray(hand.p_OC_O) for hand in scenario.hands]

@@ -5,7 +5,9 @@ from __future__ import annotations
 import warnings
 from dataclasses import dataclass
 
+import mujoco
 import numpy as np
+from dm_control.rl.control import PhysicsError
 
 from sim.contact_log import ContactLog, ContactReader
 from sim.contacts import rotations
@@ -49,8 +51,7 @@ class Motors:
 
     def __init__(self, world: World, limits: Array, joints: tuple[str, ...]) -> None:
         """Takes over what is true of the l motors, their limits, and their joints' names."""
-        self._gain = np.array(world.torque_gain) if world.torque_gain else 1.0
-        self._offset = np.array(world.torque_offset) if world.torque_offset else 0.0
+        self._gain, self._offset = np.array(world.torque_gain), np.array(world.torque_offset)
         self._noise = world.torque_noise * limits
         self._noisy = world.torque_noise > 0.0
         self._random = np.random.default_rng([world.seed, 3])
@@ -60,7 +61,9 @@ class Motors:
 
     def torques(self, t: float, tau: Array) -> Array:
         """Torques at the joints [N·m or N], (l,), before the motors saturate, at a time [s]."""
-        made = self._gain * tau + self._offset
+        made = self._gain * tau if self._gain.size else tau.copy()
+        if self._offset.size:
+            made += self._offset
         if self._noisy:
             made += self._noise * self._random.standard_normal(len(tau))
         for fault in self._faults:
@@ -96,6 +99,7 @@ class Plant:
         self.physics = dm_mujoco.Physics.from_model(wrapper.MjModel(compose(scenario).compile()))
         self.physics.legacy_step = False  # else new contacts would be read with old forces
         self._model, self._data = self.physics.model.ptr, self.physics.data.ptr
+        self._warnings = self._data.warning.number  # a view
         model = self._model
         world.change(scenario, model)
         joints = [int(model.actuator(i).trnid[0]) for i in range(model.nu)]
@@ -107,7 +111,7 @@ class Plant:
         self._pose = slice(int(free.qposadr[0]), int(free.qposadr[0]) + 7)
         self._object = thing.id
         self._contacts, self._reader = ContactLog(), ContactReader(scenario, model)
-        self._motion = MotionLog(scenario, model)
+        self._motion = MotionLog(scenario, model, self._data)
         self._motors = Motors(world, model.actuator_ctrlrange[:, 1], self.joints)
         self._pushes = world.pushes
         self._weights = of_kinds(world.faults, FaultKind.WEIGHT)
@@ -135,11 +139,15 @@ class Plant:
         """One physics step.
 
         Raises:
-            dm_control.rl.control.PhysicsError: The state has diverged.
+            PhysicsError: The state has diverged.
         """
         if self._pushes or self._weights:
             self._push()
-        self.physics.step()
+        # As dm_control's own step, whose search for warnings takes a sixth as long as the step.
+        mujoco.mj_step(self._model, self._data)
+        if np.count_nonzero(self._warnings):
+            names = np.compress(self._warnings, list(mujoco.mjtWarning.__members__))
+            raise PhysicsError(f"the state has diverged: {', '.join(names)}.")
 
     def _push(self) -> None:
         """Applies the pushes of this instant at their points on the object, and extra weight."""
@@ -159,10 +167,11 @@ class Plant:
     def measure(self) -> Measurement:
         """The present state."""
         data = self._data
-        pose = data.qpos[self._pose].copy()
+        qpos = data.qpos
+        pose = qpos[self._pose].copy()
         return Measurement(
             t=data.time,
-            q=data.qpos.take(self._q),
+            q=qpos.take(self._q),
             qd=data.qvel.take(self._qd),
             p_WO=pose[:3],
             quat_WO=pose[3:],
@@ -171,18 +180,18 @@ class Plant:
 
     def tips(self, positions: Array, quaternions: Array, twists: Array) -> None:
         """Writes the hands' tip poses and world twists (linear first), (n, 3 | 4 | 6)."""
-        self._motion.append(0, self._data)
+        self._motion.append(0)
         self._motion.tips(positions[None], quaternions[None], twists[None])
 
     def object_twist(self, twist: Array) -> None:
         """Writes the world twist of the object frame, linear part first, (6,)."""
-        self._motion.append(0, self._data)
+        self._motion.append(0)
         self._motion.object_twist(twist[None])
 
     def contacts(self, positions: Array, wrenches: Array) -> int:
         """Adds up the plant's contacts; see :meth:`ContactReader.read`, here of one step."""
-        self._contacts.count = 0
-        self._contacts.append(0, self._model, self._data)
+        self._contacts.clear()
+        self._contacts.append(0, self._data)
         R_WO = self._data.xmat[self._object].reshape(1, 3, 3)
         collisions = self._reader.read(
             self._contacts,
@@ -195,8 +204,8 @@ class Plant:
 
     def log(self, step: int) -> None:
         """Keeps the last step, of an index in a block of steps, to be read with the block."""
-        self._contacts.append(step, self._model, self._data)
-        self._motion.append(step, self._data)
+        self._contacts.append(step, self._data)
+        self._motion.append(step)
 
     def read(self, block: Trace) -> None:
         """Fills a block's columns on tips, contacts and the object's twist from what was logged.
@@ -209,4 +218,4 @@ class Plant:
         block.collisions[:] = self._reader.read(
             self._contacts, block.p_WO, rotations(block.quat_WO), block.p_WC, block.f_W
         )
-        self._contacts.count = 0
+        self._contacts.clear()

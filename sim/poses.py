@@ -7,7 +7,7 @@ from scipy.spatial.transform import Rotation
 
 from sim.grip import GripSchedule
 from sim.ik import JointPath, plan_joints
-from sim.path import ScrewPath
+from sim.path import object_path
 from sim.robot import RobotModel
 from sim.scenario import Scenario
 from sim.settings import Control
@@ -47,7 +47,7 @@ class PathProblems:
             PathError: The arms cannot follow the path.
         """
         self.scenario = scenario
-        self._path = ScrewPath(scenario.path)
+        self._path = object_path(scenario.path)
         self.end_deg = float(np.degrees(self._path.end))
         self._robot = RobotModel(scenario) if with_joints else None
         self.joint_path = joint_path or plan_joints(scenario) if with_joints else None

@@ -49,34 +49,40 @@ class References:
         self._path, self._timestep = path, timestep
         ticks = round(path.schedule.total_s / timestep)
         # A plant's clock adds up its steps, with their rounding.
-        self._times = np.concatenate([[0.0], np.cumsum(np.full(ticks, timestep))])
-        self._asked = asked = path.schedule.at(self._times)
-        self._q = np.empty((len(self._times), len(path.start)))
+        times = np.concatenate([[0.0], np.cumsum(np.full(ticks, timestep))])
+        asked = path.schedule.at(times)
+        self._q = np.empty((len(times), len(path.start)))
         self._qd, self._qdd = np.empty_like(self._q), np.empty_like(self._q)
         for phase in range(len(path.schedule.phases)):
             rows = asked.phase == phase
             progress = asked.progress[rows], asked.rate[rows, None], asked.acceleration[rows, None]
             self._q[rows], self._qd[rows], self._qdd[rows] = _motion(path, phase, *progress)
-        self._rate, self._acceleration = asked.turn * asked.rate, asked.turn * asked.acceleration
+        # Python's own numbers, which are read off several times faster one by one.
+        self._times = times.tolist()
+        rate, acceleration = asked.turn * asked.rate, asked.turn * asked.acceleration
+        self._phase, self._tilt, self._grip, self._rate, self._acceleration = (
+            column.tolist() for column in (asked.phase, asked.tilt, asked.grip, rate, acceleration)
+        )
 
     def at(self, t: float) -> Target:
         """References at a time [s]; read off at ticks, computed between them and after the end."""
         row = round(t / self._timestep)
         if row < len(self._times) and self._times[row] == t:
-            asked = self._asked
-            phase, tilt, grip = asked.phase[row], asked.tilt[row], asked.grip[row]
-            q, qd, qdd = self._q[row], self._qd[row], self._qdd[row]
-            rate, acceleration = self._rate[row], self._acceleration[row]
-        else:
-            asked = self._path.schedule.at(t)
-            phase, tilt, grip = asked.phase, asked.tilt, asked.grip
-            q, qd, qdd = _motion(
-                self._path, int(phase), asked.progress, asked.rate, asked.acceleration
+            return Target(
+                self._phase[row],
+                self._tilt[row],
+                self._grip[row],
+                self._q[row],
+                self._qd[row],
+                self._rate[row],
+                self._acceleration[row],
+                self._qdd[row],
             )
-            rate, acceleration = asked.turn * asked.rate, asked.turn * asked.acceleration
-        return Target(
-            int(phase), float(tilt), float(grip), q, qd, float(rate), float(acceleration), qdd
-        )
+        asked, path = self._path.schedule.at(t), self._path
+        phase = int(asked.phase)
+        q, qd, qdd = _motion(path, phase, asked.progress, asked.rate, asked.acceleration)
+        rate, acceleration = float(asked.turn * asked.rate), float(asked.turn * asked.acceleration)
+        return Target(phase, float(asked.tilt), float(asked.grip), q, qd, rate, acceleration, qdd)
 
 
 def _motion(

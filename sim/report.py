@@ -111,6 +111,11 @@ class Report:
     timing: TimingReport
     recording: str | None
 
+    def _repr_markdown_(self) -> str:
+        from sim.notebook import report_markdown
+
+        return report_markdown(self)
+
 
 @dataclass(frozen=True)
 class RunInfo:

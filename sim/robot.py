@@ -14,7 +14,7 @@ import pinocchio as pin
 
 from assets import velocity_limits
 from sim.scenario import Scenario
-from sim.scene import compose, tip_geom, tip_site
+from sim.scene import compose, joint_ranges, tip_geom, tip_site
 from synthesis import InvalidInputError, Joints
 from synthesis.contact import Array
 
@@ -37,7 +37,7 @@ class RobotModel:
         drives = [scene.actuator(i) for i in range(scene.nu)]
         indices = [int(drive.trnid[0]) for drive in drives]
         self.joints = tuple(scene.joint(i).name for i in indices)
-        self.q_min, self.q_max = scene.jnt_range[indices].T.copy()
+        self.q_min, self.q_max = joint_ranges(scene)[indices].T.copy()
         speeds = velocity_limits(scene)
         self.qd_max = np.array([speeds[name] for name in self.joints])
         self.tau_min, self.tau_max = np.array([drive.ctrlrange for drive in drives]).T.copy()

@@ -17,12 +17,13 @@ from sim.files import check_new_folder, finite, write_json
 from sim.judge import Judge
 from sim.loop import ClosedLoop, DivergedError
 from sim.monitor import ContactHistory, Monitor
+from sim.notebook import report_markdown
 from sim.preparation import Preparation, prepare
 from sim.recording import Recorder, open_viewer
 from sim.replanning import Replanner
 from sim.report import Report, RunInfo
 from sim.scenario import Scenario
-from sim.settings import Control
+from sim.settings import Control, controller, default_controller
 from sim.trace import Trace
 from sim.world import NO_DEVIATION, World
 
@@ -39,8 +40,8 @@ class Request:
 
     Attributes:
         scenario: The scene.
-        controller: Name of the controller, for the report.
-        control: The controller's settings.
+        controller: Name of the controller; robust if left out, or dynamic with a planned tilt.
+        control: Settings to run with instead of those that the name stands for.
         seed: Draws the small deviations of the start posture.
         out: Folder for recording, configuration and report; None writes nothing.
         live: Whether to open a viewer that follows the run (with ``out`` only).
@@ -50,14 +51,31 @@ class Request:
     """
 
     scenario: Scenario
-    controller: str
-    control: Control
+    controller: str | None = None
+    control: Control | None = None
     seed: int = 0
     out: Path | None = None
     live: bool = False
     anyway: bool = False
     world: World = NO_DEVIATION
     planning: Planning | None = None
+
+    def __post_init__(self) -> None:
+        _ = self.settings  # a name that stands for none is refused
+
+    @property
+    def name(self) -> str:
+        """Name of the controller, given or not."""
+        if self.controller is None:
+            return default_controller(self.planning is not None)
+        return self.controller
+
+    @property
+    def settings(self) -> Control:
+        """The controller's settings, given or not."""
+        if self.control is None:
+            return controller(self.scenario.control, self.name)
+        return self.control
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -68,6 +86,11 @@ class Result:
     trace: Trace
     history: ContactHistory
     error: str | None = None
+
+    def _repr_markdown_(self) -> str:
+        from sim.notebook import result_markdown
+
+        return result_markdown(self)
 
 
 def execute(
@@ -90,19 +113,19 @@ def execute(
         PlanError: The planned tilt breaks a limit.
         DivergedError: The simulation diverged in its first step.
     """
-    out = request.out
+    out, control = request.out, request.settings
     if out is not None:
         check_new_folder("out", out)
     if prepared is None:
         check, planning = not request.anyway, request.planning
-        prepared = prepare(request.scenario, request.control, check, planning=planning)
+        prepared = prepare(request.scenario, control, check, planning=planning)
     execution, replanner = prepared.execution, None
     if execution is not None:
         request = dataclasses.replace(request, scenario=execution.scenario)
-        replanner = Replanner(execution) if request.control.inertia else None
+        replanner = Replanner(execution) if control.inertia else None
     loop = ClosedLoop(
         request.scenario,
-        request.control,
+        control,
         seed=request.seed,
         joint_path=prepared.joint_path,
         world=request.world,
@@ -146,8 +169,8 @@ def execute(
                 raise
             error = f"{diverged}"
         info = RunInfo(
-            controller=request.controller,
-            objective=request.control.objective,
+            controller=request.name,
+            objective=control.objective,
             seed=request.seed,
             wall_s=time.perf_counter() - started,
             interrupted=stop.requested,
@@ -161,7 +184,7 @@ def execute(
         report = judge.report(info, trace, history)
         if out is not None and recorder is not None:
             write_json(out / REPORT, dataclasses.asdict(report))
-            recorder.close(markdown(report))
+            recorder.close(report_markdown(report))
     return Result(report, trace, history, error)
 
 
@@ -191,38 +214,12 @@ def resolved_config(request: Request) -> dict[str, Any]:
     """Everything that determines the run, for JSON; infinite limits become null."""
     return finite(
         {
-            "controller": request.controller,
+            "controller": request.name,
             "seed": request.seed,
-            "control": dataclasses.asdict(request.control),
+            "control": dataclasses.asdict(request.settings),
             "scenario": dataclasses.asdict(request.scenario),
             "world": dataclasses.asdict(request.world),
             "planning": None if request.planning is None else dataclasses.asdict(request.planning),
             "versions": {name: version(name) for name in PACKAGES},
         }
     )
-
-
-def markdown(report: Report) -> str:
-    """The report as Markdown, for people who open the recording."""
-    lines = [f"# {report.scenario}: {report.verdict.upper()}", ""]
-    lines += [f"- {failure}" for failure in report.failures]
-    if report.events:
-        lines += ["", "| time s | found | done |", "|---|---|---|"]
-        lines += [f"| {e.t:.3f} | {e.cause} | {e.reaction} |" for e in report.events]
-    tilt, torque = report.tilt, report.torque
-    lines += [
-        "",
-        f"Controller {report.controller}, objective {report.objective}, seed {report.seed}.",
-        f"Tilt {tilt.final_deg:z.2f} of {tilt.target_deg:g} deg, error at most "
-        f"{tilt.max_error_deg:.3f} deg; torque at most {100 * torque.max_utilisation:.0f} % of "
-        f"its limit ({torque.joint}).",
-        "",
-        "| contact | kept | slip mm | slide mm | spin deg | utilisation | force error N |",
-        "|---|---|---|---|---|---|---|",
-    ]
-    lines += [
-        f"| {name} | {c.kept_percent:.1f} % | {c.slip_mm:.3f} | {c.slide_mm:.3f} | "
-        f"{c.spin_deg:.3f} | {c.max_utilisation:.2f} | {c.force_error_rms_n:.2f} |"
-        for name, c in report.contacts.items()
-    ]
-    return "\n".join(lines)

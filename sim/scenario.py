@@ -7,6 +7,8 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 from sim.checks import axes, length, not_negative, positive, vector
+from sim.course import Pivot as Pivot
+from sim.course import Poses as Poses
 from sim.manipulator import Robot as Robot
 from sim.pose import Pose as Pose
 from sim.pose import Quaternion as Quaternion
@@ -201,31 +203,6 @@ class Rest:
 
 
 @dataclass(frozen=True)
-class Pivot:
-    """The path of the object: a screw motion about an axis fixed in the world.
-
-    Attributes:
-        start: Pose of the object at tilt 0.
-        point_W: A point on the axis [m].
-        axis_W: Direction of the axis; the tilt is positive by the right-hand rule.
-        angle_deg: Tilt at the end [deg].
-        pitch: Advance along the axis per radian [m].
-        travel: Translation on top of the screw, in proportion to the tilt, at the end [m].
-    """
-
-    start: Pose
-    point_W: Vector
-    axis_W: Vector
-    angle_deg: float = 90.0
-    pitch: float = 0.0
-    travel: Vector = (0.0, 0.0, 0.0)
-
-    def __post_init__(self) -> None:
-        for name in ("point_W", "axis_W", "travel"):
-            length(f"path.{name}", getattr(self, name), 3)
-
-
-@dataclass(frozen=True)
 class View:
     """Where recordings look from, relative to the path's point [m].
 
@@ -254,7 +231,7 @@ class Scenario:
     hands: tuple[Hand, ...]
     supports: tuple[Support, ...]
     robots: tuple[Robot, ...]
-    path: Pivot
+    path: Pivot | Poses
     rests: tuple[Rest, ...] = ()
     phases: tuple[Phase, ...] = (*REACH, *TILT, *HOLD)
     standoff: float = STANDOFF
@@ -315,6 +292,11 @@ class Scenario:
     def start_deviation(self) -> dict[str, float]:
         """Standard deviation of every driven joint's start [rad or m], by its name in the scene."""
         return {r.prefix + joint: r.start_deviation for r in self.robots for joint in r.posture}
+
+    def _repr_markdown_(self) -> str:
+        from sim.notebook import scenario_markdown
+
+        return scenario_markdown(self)
 
 
 def lifted(scenario: Scenario) -> Scenario:

@@ -2,16 +2,20 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from enum import StrEnum
-from pathlib import Path
 from typing import Any
 
 import mujoco
 import numpy as np
+from numpy.typing import NDArray
 
-from assets import hand_path, robot_path
+from assets.mjcf import LOOKS
+from assets.models import hand_spec, robot_spec
+from assets.packages import ModelError
 from sim.meshes import check_contacts, read_mesh
+from sim.path import check_supports
 from sim.scenario import GRAVITY, Friction, Geom, Hand, Robot, Scenario
 from synthesis import InvalidInputError
 
@@ -39,6 +43,7 @@ def compose(scenario: Scenario, motion: ObjectMotion = ObjectMotion.FREE) -> muj
             not exist, or a start angle outside its joint's range, or MuJoCo refuses the scene.
     """
     check_contacts(scenario)
+    check_supports(scenario)
     spec = _robots(scenario)
     for hand in scenario.hands:
         _add_hand(spec, hand)
@@ -83,13 +88,24 @@ def unwanted_pairs(scenario: Scenario, scene: mujoco.MjModel) -> list[tuple[str,
     surroundings = {g.name: g for g in (*scenario.object.geoms, *scenario.environment)}
     touching = {(tip_geom(hand), hand.geom) for hand in scenario.hands}
     geoms = [scene.geom(g) for g in range(scene.ngeom)]
-    links = [g.name for g in geoms if scene.body_weldid[g.bodyid[0]] != 0]
+    links = [g.name for g in geoms if scene.body_weldid[g.bodyid[0]] != 0 and is_solid(g)]
     return [
         (link, other)
         for link in links
         for other in surroundings
         if link not in surroundings and (link, other) not in touching and surroundings[other].solid
     ]
+
+
+def is_solid(geom: Any) -> bool:
+    """Whether a compiled scene's geom may touch others, rather than only show what a link is."""
+    return int(geom.group[0]) != LOOKS
+
+
+def joint_ranges(scene: mujoco.MjModel) -> NDArray[np.float64]:
+    """(njnt, 2) lower and upper limits of a scene's joints [rad or m]; infinite without limits."""
+    limited = scene.jnt_limited[:, None].astype(bool)
+    return np.where(limited, scene.jnt_range, [-np.inf, np.inf])
 
 
 def _set_options(spec: mujoco.MjSpec, scenario: Scenario) -> None:
@@ -118,21 +134,33 @@ def _robots(scenario: Scenario) -> mujoco.MjSpec:
 
 def _robot(robot: Robot) -> mujoco.MjSpec:
     """One robot at its base, with motors at the driven joints and the others locked."""
-    spec = _read(f"{robot.label}.model", robot.model, robot_path)
+    spec = _read(f"{robot.label}.model", robot_spec, robot.model)
     _check_joints(spec, robot)
     for actuator in list(spec.actuators):
-        if actuator.target not in robot.posture:
+        name = actuator.target
+        if name not in robot.posture:
             spec.delete(actuator)
-        elif actuator.target in robot.torque_limits:
-            limit = robot.torque_limits[actuator.target]
-            low, high = actuator.ctrlrange
-            actuator.ctrlrange = [max(low, -limit), min(high, limit)]
+            continue
+        low, high = actuator.ctrlrange
+        limit = robot.torque_limits.get(name, math.inf)
+        if low == high == 0.0:  # the model states none
+            low, high = -math.inf, math.inf
+        low, high = max(low, -limit), min(high, limit)
+        if not high > low > -math.inf:
+            field = f"{robot.label}.torque_limits.{name}"
+            raise InvalidInputError(field, "none, here or in the model", "a number > 0 [N m or N]")
+        actuator.ctrlrange = [low, high]
     for joint in list(spec.joints):
         if joint.name not in robot.posture:
             spec.delete(joint)
-        elif joint.name in robot.speed_limits:
-            speed, *others = joint.userdata
-            joint.userdata = [min(speed, robot.speed_limits[joint.name]), *others]
+            continue
+        stated = [speed for speed in [*joint.userdata][:1] if speed > 0.0]
+        speeds = [*stated, *(s for n, s in robot.speed_limits.items() if n == joint.name)]
+        if not speeds:
+            field = f"{robot.label}.speed_limits.{joint.name}"
+            valid = "a number > 0 [rad/s or m/s]"
+            raise InvalidInputError(field, "none, here or in the model", valid)
+        joint.userdata = [min(speeds)]
     base = robot.base
     for root in spec.worldbody.bodies:
         position, quaternion = np.zeros(3), np.zeros(4)
@@ -143,24 +171,17 @@ def _robot(robot: Robot) -> mujoco.MjSpec:
     return spec
 
 
-def _read(field: str, model: str, find: Callable[[str], Path]) -> mujoco.MjSpec:
+def _read(field: str, read: Callable[[str], mujoco.MjSpec], model: str) -> mujoco.MjSpec:
     try:
-        path = find(model)
-    except FileNotFoundError as missing:
-        raise InvalidInputError(
-            field, repr(model), str(missing).partition("valid is ")[2]
-        ) from None
-    try:
-        return mujoco.MjSpec.from_file(str(path))
-    except ValueError as error:
-        given = " ".join(str(error).split())
-        raise InvalidInputError(field, given, "a file that MuJoCo reads") from None
+        return read(model)
+    except ModelError as error:
+        raise InvalidInputError(field, error.given, error.valid) from None
 
 
 def _check_joints(spec: mujoco.MjSpec, robot: Robot) -> None:
     """Refuses joints that do not exist, and start angles outside a joint's range."""
     model = spec.copy().compile()
-    known = [model.joint(j).name for j in range(model.njnt)]
+    known = [name for j in range(model.njnt) if (name := model.joint(j).name)]
     for field in ("posture", "torque_limits", "speed_limits"):
         for name in getattr(robot, field):
             if name not in known:
@@ -178,7 +199,7 @@ def _add_hand(spec: mujoco.MjSpec, hand: Hand) -> None:
     if mount is None:
         bodies = ", ".join(body.name for body in spec.bodies)
         raise InvalidInputError(f"{hand.name}.mount", hand.mount, f"one of {bodies}")
-    model = _read(f"{hand.name}.model", hand.model, hand_path)
+    model = _read(f"{hand.name}.model", hand_spec, hand.model)
     for kind, part in (("body", "pad"), ("geom", "tip"), ("site", "tip_center")):
         if getattr(model, kind)(part) is None:
             raise InvalidInputError(f"{hand.name}.model", hand.model, f"one with a {kind} {part}")

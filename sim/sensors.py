@@ -25,24 +25,38 @@ class Sensors:
         self._pose_faults = of_kinds(world.faults, FaultKind.POSE_FROZEN, FaultKind.POSE_DEAD)
         self._frozen: dict[Fault, Array] = {}
         self._random = np.random.default_rng([world.seed, 1])
+        # Of angles, speeds, position and turn, as far as they are noisy: one draw for all of them.
+        deviations = [
+            np.full(len(joints), world.encoder_noise),
+            np.full(len(joints), world.encoder_noise * _SPEED_FILTER),
+            np.full(3, world.position_noise),
+            np.full(3, world.orientation_noise),
+        ]
+        flat = np.concatenate(deviations)
+        self._deviations = flat[flat > 0.0]
 
     def see(self, truth: Measurement) -> Measurement:
         """The measurement as the controller gets it."""
-        world = self._world
-        if world.encoder_noise > 0.0:
-            truth.q = truth.q + self._noise(world.encoder_noise, truth.q.size)
-            truth.qd = truth.qd + self._noise(world.encoder_noise * _SPEED_FILTER, truth.qd.size)
-        if world.position_noise > 0.0:
-            truth.p_WO = truth.p_WO + self._noise(world.position_noise, 3)
-        if world.orientation_noise > 0.0:
-            turned = truth.quat_WO.copy()
-            mujoco.mju_quatIntegrate(turned, self._noise(world.orientation_noise, 3), 1.0)
-            truth.quat_WO = turned
+        if self._deviations.size:
+            self._add_noise(truth)
         if self._encoder_faults:
             self._break_encoders(truth)
         if self._pose_faults:
             self._break_tracking(truth)
         return truth
+
+    def _add_noise(self, seen: Measurement) -> None:
+        world, joints = self._world, len(self._joints)
+        noise = self._deviations * self._random.standard_normal(len(self._deviations))
+        if world.encoder_noise > 0.0:
+            seen.q, seen.qd = seen.q + noise[:joints], seen.qd + noise[joints : 2 * joints]
+            noise = noise[2 * joints :]
+        if world.position_noise > 0.0:
+            seen.p_WO = seen.p_WO + noise[:3]
+        if world.orientation_noise > 0.0:
+            turned = seen.quat_WO.copy()
+            mujoco.mju_quatIntegrate(turned, noise[-3:], 1.0)
+            seen.quat_WO = turned
 
     def _break_encoders(self, seen: Measurement) -> None:
         states = np.array([seen.q, seen.qd])
@@ -64,6 +78,3 @@ class Sensors:
         if fault.kind in (FaultKind.ENCODER_DEAD, FaultKind.POSE_DEAD):
             return np.full_like(values, np.nan)
         return self._frozen.setdefault(fault, values.copy()).copy()
-
-    def _noise(self, deviation: float, size: int) -> Array:
-        return deviation * self._random.standard_normal(size)

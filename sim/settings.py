@@ -235,6 +235,23 @@ def controllers(control: Control) -> dict[str, Control]:
     }
 
 
+def controller(control: Control, name: str, field: str = "controller") -> Control:
+    """One of :func:`controllers`.
+
+    Raises:
+        InvalidInputError: There is none of that name; names the field that it was given in.
+    """
+    known = controllers(control)
+    if name not in known:
+        raise InvalidInputError(field, name, f"one of {', '.join(known)}")
+    return known[name]
+
+
+def default_controller(planned: bool) -> str:
+    """The controller that suits: only ``dynamic`` counts with the inertia of a planned tilt."""
+    return "dynamic" if planned else "robust"
+
+
 @dataclass(frozen=True)
 class Physics:
     """Settings of the contact solver; the defaults keep creep under 0.001 µm/s (see README).

@@ -125,9 +125,6 @@ class World:
         places = self.hand_place or ((0.0, 0.0),) * n
         hands = tuple(map(self._hand, scenario.hands, friction[:n], places))
         supports = tuple(map(self._support, scenario.supports, friction[n:]))
-        start, point = scenario.path.start, np.asarray(scenario.path.point_W)
-        moved = point + self.size * (np.asarray(start.position) - point)
-        path = replace(scenario.path, start=replace(start, position=_vector(moved)))
         return replace(
             scenario,
             object=self._object(scenario.object),
@@ -135,7 +132,7 @@ class World:
             hands=hands,
             supports=supports,
             rests=tuple(_rest(rest, supports) for rest in scenario.rests),
-            path=path,
+            path=scenario.path.scaled(self.size),
         )
 
     def _object(self, thing: Object) -> Object:

@@ -4,11 +4,8 @@ Variables, in this order: b at the grid points, c at the grid points, the time t
 the forces of every station and load as in :mod:`synthesis.conic`, the torque utilisations (least
 effort only) and :math:`\lambda` (friction margin only). The normal forces of the hands have the
 same columns for all loads, b and c at the ends are constants, and a is eliminated by
-:math:`a_k = (b_{k+1} - b_k) / (2 \Delta s_k)`. The time of an interval is
-:math:`2 \Delta s / (\sqrt{b_k} + \sqrt{b_{k+1}})`, which two second-order cones bound (Verscheure
-et al. 2009, (46) to (51)):
-
-.. math:: c_k^2 \le b_k, \qquad 2 \Delta s_k \le t_k (c_k + c_{k+1})
+:math:`a_k = (b_{k+1} - b_k) / (2 \Delta s_k)`. What ties t, c and b to one another stands in
+:mod:`synthesis.path_cones`.
 
 Viscous friction counts with c, which is exact where time presses c to :math:`\sqrt b`. Where it
 does not, the problem is solved again about the last solution :math:`\bar b`, with the tangent
@@ -39,7 +36,8 @@ import numpy as np
 import scipy.sparse as sp
 
 from synthesis.conic import ConicForm
-from synthesis.contact import Array
+from synthesis.contact import Array, Mask
+from synthesis.path_cones import timing_cones
 from synthesis.path_problem import Load, PathObjective, PathProblem
 from synthesis.problem import Objective, Problem
 from synthesis.rows import Indices, Rows
@@ -65,9 +63,23 @@ class PathForm:
         unit: Of forces and torques [N or N·m].
     """
 
-    def __init__(self, problem: PathProblem, reference: Array | None = None) -> None:
-        """Assembles the matrices, about a reference b [1/s^2], (K,), if there is one."""
-        self.problem, self._reference = problem, reference
+    def __init__(
+        self,
+        problem: PathProblem,
+        reference: Array | None = None,
+        grip: Array | None = None,
+        where: Mask | None = None,
+    ) -> None:
+        """Assembles the matrices.
+
+        Args:
+            problem: The problem.
+            reference: b [1/s^2], (K,), about which viscous friction counts, if there is one.
+            grip: Normal forces of the n hands [N], (S, n), where they are given.
+            where: Which stations count, (S,), where the timing is given; all if left out. S is
+                their number from here on.
+        """
+        self.problem, self._reference, self._grip = problem, reference, grip
         self.rows = Rows()
         self.unit = max(p.load for load in problem.loads for p in load.problems) or 1.0
         self._time = problem.timescale()
@@ -75,7 +87,8 @@ class PathForm:
         self._effort = problem.objective is PathObjective.LEAST_EFFORT
         self._points, self._ds = len(problem.s), np.diff(problem.s)
         self._timed = self._points > 1 and problem.timing is None
-        self._point, self._interval = problem.stations.T
+        stations = problem.stations
+        self._point, self._interval = (stations if where is None else stations[where]).T
         joints = problem.loads[0].problems[0].joints
         self._joints = () if joints is None else joints.names
         self._blocks = self._lay_out_columns()
@@ -223,30 +236,8 @@ class PathForm:
                 heads.append(rows[:, 0])
             self._heads.append(np.stack(heads, axis=1) if heads else np.zeros((0, 0), np.intp))
         if self._timed:
-            self._timing_cones()
+            timing_cones(self.rows, self.problem.s, self._b, self._c, self._t)
             self._acceleration_cones()
-
-    def _timing_cones(self) -> None:
-        """(1 + b) / 2 >= ||(c, (1 - b) / 2)||; (t + r) / 2 >= ||(w, (t - r) / 2)||, r = c + c'."""
-        # Rates in units of the path's length per timescale, and the time of each interval in units
-        # of its share of it: all are about 1.
-        length, share = self._ds.sum(), self._ds / self._ds.sum()
-        # Rates at the ends are constants: their cones would have no interior, and say nothing.
-        s, b, c = self.problem.s[1:-1], self._b[1:-1], self._c[1:-1]
-        if len(s):
-            rows = self.rows.new(np.tile([0.5, 0.0, 0.5], (len(s), 1)), s, [""] * 3)
-            self.rows.add(-0.5 / length**2, rows[:, 0], b)
-            self.rows.add(-1.0 / length, rows[:, 1], c)
-            self.rows.add(0.5 / length**2, rows[:, 2], b)
-            self.rows.second_order(rows)
-        h = np.tile([0.0, math.sqrt(2.0), 0.0], (len(share), 1))
-        rows = self.rows.new(h, self.problem.s[:-1], [""] * 3)
-        for column in (self._c[:-1], self._c[1:]):
-            self.rows.add(-0.5 / length, rows[:, 0], column)
-            self.rows.add(0.5 / length, rows[:, 2], column)
-        self.rows.add(-0.5 / share, rows[:, 0], self._t)
-        self.rows.add(-0.5 / share, rows[:, 2], self._t)
-        self.rows.second_order(rows)
 
     def _acceleration_cones(self) -> None:
         limited, point = self.problem.accelerations, self._point
@@ -278,6 +269,10 @@ class PathForm:
             b * self._time**2,
             np.sqrt(b) * self._time,
         )
+        if self._grip is not None:
+            _, form, _, _, columns = self._blocks[0]
+            hands = columns[:, form.hand_normals]
+            fixed[hands], self._constant[hands] = True, self._grip / self.unit
         self._free = np.flatnonzero(~fixed)
         self._h = h - whole @ self._constant
         self._A = whole[:, self._free]
@@ -286,7 +281,8 @@ class PathForm:
         q[self._t] = float(least_time)
         if self._margin:
             q[self._aux] = 1.0
-        P[self._u] = 2.0 * self._weights()[:, None]
+        if self._effort:
+            P[self._u] = 2.0 * self._weights()[:, None]
         self.q = q[self._free]
         self.P = sp.diags_array(P[self._free]).tocsc()
 

@@ -16,6 +16,7 @@ import numpy as np
 from synthesis.contact import Array, ContactModel
 from synthesis.errors import InvalidInputError
 from synthesis.problem import Problem
+from synthesis.rows import Indices
 
 
 class PathObjective(StrEnum):
@@ -254,6 +255,31 @@ class PathProblem:
                 worst = joints.names[int(np.argmin(usable))]
                 asks = f"finite with tau_min < tau_max, as objective {self.objective} asks"
                 raise InvalidInputError(f"limits of {worst}", "no finite range", asks)
+
+    def at(self, points: Indices) -> PathProblem:
+        """The same path on fewer of its grid points, by their indices."""
+
+        torques, rates, limited = self.inertial_torques, self.rates, self.accelerations
+        if torques is not None:
+            parts = (torques.tau_a, torques.tau_b, torques.tau_c)
+            torques = InertialTorques(*(tau[points] for tau in parts))
+        if rates is not None:
+            rates = replace(rates, slopes=rates.slopes[points])
+        if limited is not None:
+            slopes, curvatures = limited.slopes[points], limited.curvatures[points]
+            limited = replace(limited, slopes=slopes, curvatures=curvatures)
+        return replace(
+            self,
+            s=self.s[points],
+            loads=tuple(
+                Load(tuple(e.problems[k] for k in points), e.w_a_O[points], e.w_b_O[points])
+                for e in self.loads
+            ),
+            inertial_torques=torques,
+            rates=rates,
+            accelerations=limited,
+            timing=None if self.timing is None else self.timing[points],
+        )
 
     @property
     def stations(self) -> Array:

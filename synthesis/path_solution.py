@@ -104,9 +104,8 @@ class PathSolution:
     def shares(self) -> dict[str, Array]:
         """How much of each limit is used [-], (S,), by its name; with the load that uses most."""
         found: dict[str, Array] = {}
-        for i, (load, w_OC_C) in enumerate(zip(self.problem.loads, self.w_OC_C, strict=True)):
-            own = self._shares_with(i, w_OC_C, ContactSet.of(load.problems[0].contacts))
-            for name, share in own.items():
+        for i in range(len(self.problem.loads)):
+            for name, share in self.shares_with(i).items():
                 found[name] = np.maximum(found.get(name, -np.inf), share)
         point = self.problem.stations[:, 0]
         a, b = self.motion
@@ -122,8 +121,10 @@ class PathSolution:
             }
         return found
 
-    def _shares_with(self, i: int, w_OC_C: Array, facts: ContactSet) -> dict[str, Array]:
-        load, point = self.problem.loads[i], self.problem.stations[:, 0]
+    def shares_with(self, i: int) -> dict[str, Array]:
+        """The same of forces and torques with one load, by its index."""
+        load, point, w_OC_C = self.problem.loads[i], self.problem.stations[:, 0], self.w_OC_C[i]
+        facts = ContactSet.of(load.problems[0].contacts)
         found = {}
         for j, contact in enumerate(load.problems[0].contacts):
             found[f"friction of {contact.name}"] = self.utilisation[i][:, j]

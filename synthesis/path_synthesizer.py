@@ -56,21 +56,31 @@ def solve_path(problem: PathProblem) -> PathSolution:
 def _optimum(form: PathForm) -> PathSolution:
     if form.problem.objective is PathObjective.FRICTION_MARGIN:
         return _largest_margin(form)
-    found = _solve(form, 1.0, None, ("Solved",))
+    found = solve_form(form, 1.0, None, ("Solved",))
     return found.solution(form, form.value(found.every))
 
 
 @dataclass(frozen=True, eq=False)
-class _Found:
-    """One solve: all variables, and how optimal they are."""
+class Found:
+    """One solve.
+
+    Attributes:
+        every: All variables.
+        least: The objective in the solver's units.
+        dual, gap: See :class:`PathResiduals`.
+        iterations: Interior-point iterations.
+        solve_s: Time inside the solver [s].
+    """
 
     every: Array
+    least: float
     dual: float
     gap: float
     iterations: int
     solve_s: float
 
     def solution(self, form: PathForm, value: float) -> PathSolution:
+        """The same by its names, with a value of the objective."""
         return PathSolution(
             problem=form.problem,
             value=value,
@@ -83,9 +93,21 @@ class _Found:
         )
 
 
-def _solve(
+def solve_form(
     form: PathForm, utilisation: float, slack: list[Array] | None, accepted: tuple[str, ...]
-) -> _Found:
+) -> Found:
+    """One solve of a form.
+
+    Args:
+        form: The form.
+        utilisation, slack: See :meth:`PathForm.matrices`.
+        accepted: What the solver may say of an answer.
+
+    Raises:
+        InfeasiblePathError: There is none; says where and which limits.
+        UnboundedError: The objective improves without limit.
+        SolverError: The solver gave neither.
+    """
     A, h = form.matrices(utilisation, slack)
     started = time.perf_counter()
     iterations = 0
@@ -104,7 +126,8 @@ def _solve(
                 x = np.array(result.x)
                 solve_s = time.perf_counter() - started
                 dual, gap = _optimality(form, A, h, x, z)
-                return _Found(form.completed(x), dual, gap, iterations, solve_s)
+                least = float(form.q @ x)
+                return Found(form.completed(x), least, dual, gap, iterations, solve_s)
     raise SolverError(status)
 
 
@@ -142,14 +165,14 @@ def _proof(form: PathForm, A: Array, h: Array, z: Array) -> InfeasiblePathError:
 
 def _largest_margin(form: PathForm) -> PathSolution:
     """Dinkelbach's method; every iterate is feasible, so that stopping early costs margin only."""
-    found = _solve(form, 1.0, None, SOLVED)
+    found = solve_form(form, 1.0, None, SOLVED)
     best = found.solution(form, 0.0)
     iterations, solve_s = found.iterations, found.solve_s
     s, slack = _largest_utilisation(form, best)
     for _ in range(_MARGIN_SOLVES):
         if not any(d.any() for d in slack):
             break
-        found = _solve(form, s, slack, SOLVED)
+        found = solve_form(form, s, slack, SOLVED)
         iterations += found.iterations
         solve_s += found.solve_s
         last = found.solution(form, 0.0)

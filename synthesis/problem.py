@@ -209,6 +209,11 @@ class Problem:
         J = self.joints.J_C.reshape(-1, len(self.joints.names))
         return w_OC_C[self.contact_set.hand_rows].ravel().dot(J) + self.joints.tau_g
 
+    def _repr_markdown_(self) -> str:
+        from synthesis.notebook import problem_markdown
+
+        return problem_markdown(self)
+
 
 def _check_shape(name: str, array: Array, shape: tuple[int, ...]) -> None:
     if array.shape != shape:

@@ -210,6 +210,11 @@ class Solution:
             return abs(dual)
         return abs(self.value - dual)
 
+    def _repr_markdown_(self) -> str:
+        from synthesis.notebook import solution_markdown
+
+        return solution_markdown(self)
+
 
 @dataclass(frozen=True, eq=False)
 class Certificate:
@@ -248,6 +253,11 @@ class Certificate:
         """Names of the constraints with the largest multipliers, heaviest first."""
         weights = self.multipliers.weights(self.problem)
         return sorted((n for n in weights if weights[n] > 0.0), key=lambda n: -weights[n])[:count]
+
+    def _repr_markdown_(self) -> str:
+        from synthesis.notebook import certificate_markdown
+
+        return certificate_markdown(self)
 
 
 def certificate(problem: Problem, ray: Multipliers) -> Certificate:

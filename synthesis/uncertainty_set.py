@@ -104,13 +104,21 @@ class UncertaintySet:
             gravity: The weight, which its external wrench contains.
         """
         w_rest = problem.w_ext_O - gravity.wrench_O
-        contacts = tuple(self._slippery(contact) for contact in problem.contacts)
-        placed = [self._displaced(problem, contacts, d_C) for d_C in self._offsets(problem)]
-        wrenches = itertools.product(placed, self._weights(gravity), self._pushes(gravity))
+        wrenches = itertools.product(
+            self.placed(problem), self._weights(gravity), self._pushes(gravity)
+        )
         return tuple(
             replace(world, w_ext_O=w_rest + w_weight + w_push)
             for world, w_weight, w_push in wrenches
         )
+
+    def placed(self, problem: Problem) -> tuple[Problem, ...]:
+        """The problem with the lowest friction, and with the hands at each of their extreme places.
+
+        They are as many for all problems whose contacts are fixed in the object alike.
+        """
+        contacts = tuple(self._slippery(contact) for contact in problem.contacts)
+        return tuple(self._displaced(problem, contacts, d_C) for d_C in self._offsets(problem))
 
     def _slippery(self, contact: Contact) -> Contact:
         if contact.model is ContactModel.FRICTIONLESS:

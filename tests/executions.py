@@ -28,6 +28,15 @@ def executed(name, stretch, world=NO_DEVIATION, **changes):
     return execute(request, prepared=Preparation.of(execution(name, stretch)))
 
 
+@functools.cache
+def executed_as(name, planning, world=NO_DEVIATION):
+    """The same of a plan that is asked for in another way."""
+    s = scenario(name)
+    control = controllers(s.control)["dynamic"]
+    request = Request(s, "dynamic", control, world=world, planning=planning)
+    return execute(request, prepared=Preparation.of(planned_tilt(s, planning)))
+
+
 def longest(flags):
     """The most steps in a row for which one of the columns is set."""
     edges = [np.flatnonzero(np.diff([0, *column, 0])) for column in (flags > 0.0).T.astype(int)]

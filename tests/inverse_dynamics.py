@@ -52,7 +52,7 @@ class InverseDynamics:
         return needed - given + moment.tau
 
     def _set(self, moment):
-        data, tilt, axis = self._data, moment.tilt, self._path.axis
+        data, tilt, axis = self._data, moment.tilt, self._path.direction
         R_WO, p_WO = self._path.pose(tilt)
         slope, curvature = self._path.derivatives(tilt, np.zeros(3))
         data.qpos[self._q], data.qvel[self._v] = moment.q, moment.qd

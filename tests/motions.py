@@ -46,7 +46,7 @@ def trace_of(tilt, rate):
     poses = [path.pose(angle) for angle in tilt]
     R_WO, p_WO = np.array([R for R, _ in poses]), np.array([p for _, p in poses])
     trace.p_WO[:], trace.quat_WO[:] = p_WO, quaternions(R_WO)
-    turn = rate[:, None] * path.axis
+    turn = rate[:, None] * path.direction
     trace.twist_WO[:, :3] = np.cross(turn, p_WO - np.array(BOX.path.point_W))
     trace.twist_WO[:, 3:] = turn
     touching = [*BOX.hands, *BOX.supports]

@@ -9,10 +9,12 @@ import pinocchio as pin
 import pytest
 
 from assets import asset_path, description_path, velocity_limits
-from assets.from_urdf import GRIPPER_JOINTS, baxter_mjcf, baxter_urdf, without_branches
+from assets.from_urdf import GRIPPER_JOINTS, RECIPES, shipped_mjcf, urdf_of
+from assets.urdf import without_branches
 from assets.visuals import load_visuals
 
-URDF = baxter_urdf()
+URDF = urdf_of("baxter")
+FILE = description_path("baxter_description/urdf/baxter.urdf")
 LINKS = [link.attrib["name"] for link in ET.fromstring(URDF).findall("link")]
 HANDS = ("left_hand_link", "right_hand_link")
 # Both libraries compute in double precision; the largest number compared is ~1e2, and a chain of
@@ -122,8 +124,9 @@ def deviation(left: Facts, right: Facts) -> dict[str, float]:
     return {key: float(np.abs(left[key] - right[key]).max()) for key in left}
 
 
-def test_baxter_xml_is_what_the_generator_makes():
-    assert asset_path("baxter.xml").read_text() == baxter_mjcf()
+@pytest.mark.parametrize("name", RECIPES)
+def test_the_shipped_file_is_what_the_generator_makes(name):
+    assert asset_path(f"{name}.xml").read_text() == shipped_mjcf(name)
 
 
 def test_every_link_is_a_body_and_the_grippers_are_gone(mj_model):
@@ -239,7 +242,7 @@ def test_geoms_are_named_and_touch_nothing_unless_paired(mj_model):
 
 
 def test_visuals_are_complete_and_within_budget():
-    visuals = load_visuals(URDF)
+    visuals = load_visuals(URDF, FILE)
     described = [
         link.attrib["name"]
         for link in ET.fromstring(URDF).findall("link")
@@ -269,7 +272,7 @@ def pin_visuals(pin_model) -> dict[str, pin.GeometryObject]:
 def largest_box_error(shapes: dict[str, pin.GeometryObject], turn: np.ndarray) -> float:
     """Largest difference [m] between the boxes around our meshes, turned, and Pinocchio's."""
     errors = []
-    for visual in load_visuals(URDF):
+    for visual in load_visuals(URDF, FILE):
         geometry = shapes[visual.link].geometry
         geometry.computeLocalAABB()
         vertices = visual.vertices @ turn.T
@@ -288,7 +291,7 @@ def test_a_mesh_turned_from_y_up_to_z_up_is_caught(pin_visuals):
 
 
 def test_meshes_sit_in_their_links_where_pinocchio_has_them(pin_model, pin_visuals):
-    for visual in load_visuals(URDF):
+    for visual in load_visuals(URDF, FILE):
         shape = pin_visuals[visual.link]
         placement = pin_model.frames[shape.parentFrame].placement.actInv(shape.placement)
         np.testing.assert_allclose(visual.X_LM, placement.homogeneous, atol=ROUNDING)

@@ -10,6 +10,7 @@ import pytest
 
 from scenarios import scenario
 from scenarios.cli import main
+from scenarios.common import chosen_planning
 from sim.execution import Planning, planned_tilt
 from sim.faults import Fault, FaultKind
 from sim.plant import Measurement
@@ -23,7 +24,8 @@ from sim.sweep.episode import run_episode
 from sim.world import World
 from synthesis import InvalidInputError
 from synthesis.contact import N
-from tests.executions import broken, executed, execution, longest
+from synthesis.path_problem import PathObjective
+from tests.executions import broken, executed, executed_as, execution, longest
 from tests.plans import BOX, CYLINDER, fastest
 from tests.recordings import Content
 from tests.runs import rows_of, settled
@@ -83,6 +85,31 @@ def test_a_torque_may_be_cut_for_as_long_as_the_tolerances_say():
     assert scene.tolerances.saturated_s == 0.02
     assert 0 < longest(result.trace.saturated) <= 20
     assert "cut" not in " ".join(result.report.failures)
+
+
+def test_a_robust_plan_bears_a_world_in_which_the_box_slips_without():
+    # Three quarters of the set that the plan serves: on its edge friction is used up.
+    world = World(mass=1.15, center_of_mass=(0.015, 0.0, -0.015), friction=(0.85,) * 4)
+    assert broken(BOX, executed_as(BOX, Planning(points=30, robust=True), world)) == set()
+    assert "slip" in broken(BOX, executed(BOX, 1.0, world))
+
+
+def test_a_plan_for_another_objective_is_executed_too():
+    planning = Planning(points=30, objective=PathObjective.FRICTION_MARGIN, duration=1.6)
+    result = executed_as(BOX, planning)
+    assert broken(BOX, result) == set()
+    lasted = np.count_nonzero(rows_of(BOX, result.trace, "tilt")) * TICK
+    assert 1.2 * fastest(BOX).duration < lasted <= 1.6 + 2 * TICK
+
+
+def test_the_options_of_a_planning_make_it():
+    chosen = scenario(BOX)
+    asked = Planning(1.5, objective=PathObjective.LEAST_EFFORT, duration=3.0, robust=True)
+    assert asked.options == "--plan least-effort --stretch 1.5 --duration 3.0 --robust"
+    assert chosen_planning(chosen, "least-effort", 1.5, 3.0, True) == asked
+    assert chosen_planning(chosen, "least-effort", 1.0, None, False).duration == 8.0
+    assert math.isinf(chosen_planning(chosen, "least-time", 1.0, None, False).duration)
+    assert chosen_planning(chosen, None, 1.0, 3.0, False) is None
 
 
 # --- planned anew
@@ -197,8 +224,9 @@ def test_a_plan_over_the_tilt_is_the_plan_over_time():
     [
         (["--plan", "most-time"], "least-time"),
         (["--stretch", "2"], "--plan"),
+        (["--robust"], "--plan"),
         (["--plan", "least-time", "--stretch", "0"], "stretch"),
-        (["--plan", "least-time", "--duration", "3"], "--duration"),
+        (["--plan", "least-effort", "--duration", "0"], "duration"),
     ],
 )
 def test_bad_options_are_refused_in_one_line(tmp_path, capsys, wrong, named):

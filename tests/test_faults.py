@@ -11,9 +11,9 @@ from scenarios.cli import main
 from sim.faults import Fault, FaultKind
 from sim.guard import Mode
 from sim.loop import ClosedLoop
+from sim.notebook import report_markdown
 from sim.report import Verdict
 from sim.robot import RobotModel
-from sim.run import markdown
 from sim.schedule import Schedule
 from sim.settings import Guard
 from sim.uncertainty import draw, preset
@@ -68,7 +68,7 @@ def test_the_report_names_cause_time_and_reaction(name):
     assert earliest <= report.events[0].t <= latest
     times = [event.t for event in report.events]
     assert times == sorted(times)
-    text = markdown(report)
+    text = report_markdown(report)
     for event in report.events:
         assert f"| {event.t:.3f} | {event.cause} | {event.reaction} |" in text
     given_up = [f for f in report.failures if f.startswith("The run was ")]
@@ -123,7 +123,7 @@ def test_the_recording_is_complete_to_the_last_step(name):
         times, _ = content.series(entity, "Scalars:scalars")
         assert len(times) == len(trace)
         assert times[-1] == pytest.approx(trace.t[-1], abs=2 * NANOSECOND)
-    assert content.text("verdict") == markdown(result.report)
+    assert content.text("verdict") == report_markdown(result.report)
     shown = [state for _, state in content.states("phase")]
     for reaction in {e.reaction for e in result.report.events} & {"hold", "lower", "stop"}:
         assert any(state.startswith(f"{reaction.upper()}: ") for state in shown)

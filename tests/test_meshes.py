@@ -99,7 +99,7 @@ def test_plant_and_plan_know_a_turned_inertia(files):
     inertia = R @ np.diag(body.inertia) @ R.T
     path = ScrewPath(BOX.path)
     w_a, w_b = inertial_wrenches(replace(BOX, object=thing), path, 0.4)
-    omega = path.pose(0.4)[0].T @ path.axis
+    omega = path.pose(0.4)[0].T @ path.direction
     center = np.array(thing.center_of_mass)
     for wrench, moment in ((w_a, inertia @ omega), (w_b, np.cross(omega, inertia @ omega))):
         found = wrench[3:] - np.cross(center, wrench[:3])

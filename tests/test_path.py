@@ -89,12 +89,12 @@ def test_motion_is_rigid(pivot, tilt):
 @given(pivots, tilts, unit_floats)
 def test_axis_points_only_advance_by_the_pitch(pivot, tilt, along):
     path = ScrewPath(pivot)
-    on_axis = np.array(pivot.point_W) + along * path.axis
+    on_axis = np.array(pivot.point_W) + along * path.direction
     R_0, p_0 = path.pose(0.0)
     R, p = path.pose(tilt)
     moved = R @ R_0.T @ (on_axis - p_0) + p
     np.testing.assert_allclose(
-        moved, on_axis + pivot.pitch * tilt * path.axis, rtol=0, atol=ROUNDING
+        moved, on_axis + pivot.pitch * tilt * path.direction, rtol=0, atol=ROUNDING
     )
 
 
@@ -108,7 +108,7 @@ def test_axis_points_move_by_the_advance_per_radian(pivot, travel, tilt):
     # Travels of 1 m in 90 deg are advances of less than 2 m/rad: twice the rounding.
     np.testing.assert_allclose(moved - path.point, tilt * path.advance, rtol=0, atol=2.0 * ROUNDING)
     # At the end the whole travel has been added to the pitch.
-    whole = pivot.pitch * path.end * path.axis + np.array(travel)
+    whole = pivot.pitch * path.end * path.direction + np.array(travel)
     np.testing.assert_allclose(path.end * path.advance, whole, rtol=0, atol=ROUNDING)
 
 
@@ -117,14 +117,14 @@ def test_an_advance_without_the_travel_is_caught():
     R_0, p_0 = lifted.pose(0.0)
     R, p = lifted.pose(lifted.end)
     moved = R @ R_0.T @ (lifted.point - p_0) + p
-    assert np.abs(moved - lifted.point - lifted.end * 0.1 * lifted.axis).max() > 9e-4
+    assert np.abs(moved - lifted.point - lifted.end * 0.1 * lifted.direction).max() > 9e-4
 
 
 @exhaustive
 @given(pivots, tilts)
 def test_a_point_off_the_axis_moves_by_the_chord(pivot, tilt):
     path = ScrewPath(replace(pivot, pitch=0.0))
-    radius = np.cross(path.axis, [0.6, -0.8, 0.3])
+    radius = np.cross(path.direction, [0.6, -0.8, 0.3])
     off_axis = np.array(pivot.point_W) + radius
     R_0, p_0 = path.pose(0.0)
     R, p = path.pose(tilt)
@@ -197,9 +197,9 @@ def test_tilt_inverts_pose(pivot, tilt):
 @given(pivots, tilts, directions, st.floats(-1.0, 1.0), st.booleans())
 def test_swing_about_an_axis_across_does_not_count_as_tilt(pivot, tilt, direction, angle, before):
     path = ScrewPath(pivot)
-    across = np.cross(path.axis, direction)
+    across = np.cross(path.direction, direction)
     swing = Rotation.from_rotvec(angle * across)
-    turn = Rotation.from_rotvec(tilt * path.axis)
+    turn = Rotation.from_rotvec(tilt * path.direction)
     # The swing may come before or after the tilt.
     moved = (turn * swing if before else swing * turn) * rotation(pivot.start)
     # Near a half turn with much swing the twist is the angle of a short vector (cos 85 deg).
@@ -212,10 +212,10 @@ def test_swing_about_an_axis_across_does_not_count_as_tilt(pivot, tilt, directio
 def test_a_small_oblique_turn_counts_by_its_share_about_the_axis(pivot, tilt, direction, angle):
     path = ScrewPath(pivot)
     disturbance = angle * np.array(direction)
-    turn = Rotation.from_rotvec(disturbance) * Rotation.from_rotvec(tilt * path.axis)
+    turn = Rotation.from_rotvec(disturbance) * Rotation.from_rotvec(tilt * path.direction)
     found = path.tilt((turn * rotation(pivot.start)).as_quat(scalar_first=True))
     # What is left is of second order in the disturbance, of length sqrt(3) * angle at most.
-    expected = tilt + disturbance @ path.axis
+    expected = tilt + disturbance @ path.direction
     assert found == pytest.approx(expected, abs=3.0 * angle**2 + 10.0 * ROUNDING)
 
 

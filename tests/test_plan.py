@@ -8,6 +8,7 @@ import pytest
 from scenarios import scenario
 from sim.plan import PlanError, plan
 from sim.plan_problem import Margins, path_problem
+from sim.plan_robust import robust_plan
 from synthesis import InfeasibleError, InvalidInputError, Synthesizer
 from synthesis.contact import N
 from synthesis.path_problem import PathObjective
@@ -217,12 +218,13 @@ def test_soft_hands_take_longer_and_keep_their_limits():
 
 
 def test_a_robust_plan_serves_its_set_with_one_grip_and_not_more():
-    nominal, margins = scenario(BOX), replace(MARGINS[BOX], friction_factor=1.0)
+    nominal = scenario(BOX)
     uncertainty = UncertaintySet(mass=0.1, center=(0.01, 0.0, 0.0), friction=0.15)
-    found = plan(nominal, margins, points=30, uncertainty=uncertainty)
+    found = plan(nominal, MARGINS[BOX], points=30, uncertainty=uncertainty)
     grips = [w_OC_C[:, :2, N] for w_OC_C in found.solution.w_OC_C]
     assert len(grips) == 1 + 2 * 2
-    assert all((grip == grips[0]).all() for grip in grips)
+    for grip in grips:
+        np.testing.assert_allclose(grip, grips[0], rtol=1e-12)
     assert found.solution.residuals.primal < 1e-6
     # A world within the set, in the plan's timing and with its grip: forces exist.
     thing = nominal.object
@@ -249,6 +251,19 @@ def servable(planned, world, friction):
         except InfeasibleError:
             return False
     return True
+
+
+def test_what_one_grip_cannot_serve_is_served_in_part():
+    # With 30 N a finger the cylinder can be 12 % heavier, but not 20 %.
+    most = UncertaintySet(mass=0.2)
+    found = robust_plan(scenario(CYLINDER), MARGINS[CYLINDER], most, points=25)
+    assert 0.25 <= found.share < 1.0
+    with pytest.raises(PlanError):
+        plan(scenario(CYLINDER), MARGINS[CYLINDER], points=25, uncertainty=most)
+    plan(scenario(CYLINDER), MARGINS[CYLINDER], points=25, uncertainty=most.scaled(found.share))
+    none = robust_plan(scenario(CYLINDER), MARGINS[CYLINDER], UncertaintySet(), points=25)
+    assert none.share == 1.0
+    assert none.duration < found.duration
 
 
 # --- refusals

@@ -46,7 +46,7 @@ def test_the_hands_move_with_the_object_to_1e_6(name):
         J_C = robot.contact_jacobians(frames.points(R_WO, p_WO)[:hands], axes)
         for i, (J, R_WC) in enumerate(zip(J_C, axes, strict=True)):
             slope, _ = path.derivatives(path.end * s, frames.p_OC_O[i])
-            twist = path.end * np.concatenate([R_WC.T @ slope, R_WC.T @ path.axis])
+            twist = path.end * np.concatenate([R_WC.T @ slope, R_WC.T @ path.direction])
             assert J @ curve(s, 1) == pytest.approx(twist, abs=1e-6)
 
 

@@ -43,13 +43,16 @@ def test_a_plan_takes_its_margins_from_the_scenario_where_none_are_given(tmp_pat
     assert content["margins"]["grip_min"] == 10.0
 
 
-def test_a_plan_can_serve_an_uncertain_object(tmp_path):
-    arguments = ["box-tilt", "--mass", "0.1", "--friction", "0.1"]
-    code, content = planned(tmp_path, *arguments)
+def test_a_robust_plan_says_how_much_of_the_set_it_serves(tmp_path, capsys):
+    code, content = planned(tmp_path, "box-tilt", "--robust")
     assert code == 0
-    assert np.shape(content["stations"]["torque"]) == (3, 38, 14)
+    assert content["share_of_uncertainty"] == 1.0
+    # Mass and centre of mass have 16 corners, hands with opposite normals 4 extreme places.
+    assert content["loads"] == 1 + 16 * 4
+    assert np.shape(content["stations"]["torque"]) == (65, 38, 14)
+    assert "65 worlds: 100 % of the set" in capsys.readouterr().out
     _, certain = planned(tmp_path / "other", "box-tilt")
-    assert content["duration_s"] > certain["duration_s"]
+    assert content["duration_s"] > 1.02 * certain["duration_s"]
 
 
 def test_a_plan_can_be_stretched(tmp_path):

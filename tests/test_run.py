@@ -13,9 +13,10 @@ from scenarios import scenario
 from scenarios.cli import main
 from sim.ik import PathError
 from sim.loop import ClosedLoop, DivergedError
+from sim.notebook import report_markdown
 from sim.plant import Plant
 from sim.report import Verdict
-from sim.run import Request, execute, markdown, resolved_config
+from sim.run import Request, execute, resolved_config
 from sim.settings import stretched
 from tests.short_run import short_tilt
 
@@ -114,11 +115,11 @@ def test_progress_counts_up_to_all_steps(result, progress):
 
 def test_the_text_of_the_verdict_holds_verdict_contacts_and_failures(result):
     report = replace(result.report, verdict=Verdict.FAIL, failures=("Contact left let go.",))
-    text = markdown(report)
+    text = report_markdown(report)
     assert text.startswith("# box-tilt: FAIL\n")
     assert "- Contact left let go." in text
     for name, contact in report.contacts.items():
-        assert f"| {name} | 100.0 % | {contact.slip_mm:.3f} |" in text
+        assert f"| {name} | 100.0 | {contact.slip_mm:.3f} |" in text
 
 
 def test_without_a_folder_nothing_is_written_and_the_run_is_the_same(result, tmp_path, monkeypatch):

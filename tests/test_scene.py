@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from assets import asset_path, robot_path
+from assets import asset_path
+from assets.models import robot_spec
 from scenarios import scenario, scenarios
 from scenarios.scene_files import scene_xml
 from sim.scenario import Friction, Geom, Pose
@@ -243,7 +244,7 @@ def test_only_driven_joints_move_and_each_has_its_motor(scene):
     motors = [model.joint(int(j)).name for j in model.actuator_trnid[:, 0]]
     assert sorted(motors) == sorted(driven)
     for robot in scene.robots:
-        official = mujoco.MjModel.from_xml_path(str(robot_path(robot.model)))
+        official = robot_spec(robot.model).compile()
         motor_of = {
             official.joint(int(j)).name: i for i, j in enumerate(official.actuator_trnid[:, 0])
         }
@@ -274,7 +275,7 @@ def robot_bodies(model, robot, prefix=""):
 def test_locking_joints_leaves_masses_and_places_at_angle_zero(scene):
     model = compose(based(scene, Pose()), ObjectMotion.POSED).compile()
     for robot in scene.robots:
-        spec = mujoco.MjSpec.from_file(str(robot_path(robot.model)))
+        spec = robot_spec(robot.model)
         alone = spec.compile()
         expected = robot_bodies(alone, alone)
         found = robot_bodies(model, alone, robot.prefix)

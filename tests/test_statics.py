@@ -159,7 +159,7 @@ def test_statics_balances_a_virtual_motion_of_hands_and_object(name):
     for i in problem.hands:
         p, R_WC = problem.p_OC_O[i], R_WO @ problem.R_OC[i]
         velocity = (p_b + R_b @ p - p_a - R_a @ p) / (2.0 * h)
-        work += R_WC @ wrenches[i, :3] @ velocity + R_WC @ wrenches[i, 3:] @ path.axis
+        work += R_WC @ wrenches[i, :3] @ velocity + R_WC @ wrenches[i, 3:] @ path.direction
     # Central differences leave rounding over 2 h, 1e-10, and d^2 / 6 times a third derivative of
     # the path of ~10 rad: 2e-8; the spline's slope is off by 1e-6.
     assert tau @ slope == pytest.approx(work, abs=2e-5)

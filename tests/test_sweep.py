@@ -137,7 +137,7 @@ def story(tmp_path_factory):
     # A cluster that runs already; the first two acts had their own.
     with LocalCluster(n_workers=2, threads_per_worker=1, dashboard_address="127.0.0.1:0") as there:
         cluster = Workers(scheduler=there.scheduler_address)
-        rows = run_sweep(sweep, Store(sweep, out), cluster, progress).to_pylist()
+        rows = run_sweep(sweep, out, cluster, progress).rows.to_pylist()
     return Story(
         sweep, out, errors, driver.returncode, kept, orphans, workers[0], seen, parts, rows
     )
@@ -265,12 +265,12 @@ def test_episodes_that_kill_their_workers_are_named_and_not_tried_for_ever(tmp_p
         dask.config.set({"distributed.scheduler.allowed-failures": 0}),
         pytest.raises(LostEpisodesError, match="0000000-margin"),
     ):
-        run_sweep(sweep, store, Workers(1))
+        run_sweep(sweep, store.folder, Workers(1))
     assert len(store.missing()) == 1
 
 
 def test_a_scheduler_that_is_none_is_refused_and_leaves_no_files(tmp_path):
     sweep = short_sweep(controllers=("margin",))
     with pytest.raises(InvalidInputError, match="address of a running Dask scheduler"):
-        run_sweep(sweep, Store(sweep, tmp_path / "out"), Workers(scheduler="nowhere://at-all"))
+        run_sweep(sweep, tmp_path / "out", Workers(scheduler="nowhere://at-all"))
     assert not (tmp_path / "out").exists()

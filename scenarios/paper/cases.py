@@ -9,7 +9,7 @@ import numpy as np
 
 from scenarios import scenario
 from sim.poses import PathProblems
-from sim.scenario import Scenario
+from sim.scenario import Pivot, Scenario
 from synthesis import InfeasibleError, Objective, Solution, Synthesizer
 from synthesis.contact import Array, N
 
@@ -60,6 +60,7 @@ def paper_cylinder() -> Scenario:
     tilted = scenario("cylinder-tilt")
     rim = -tilted.supports[0].p_OP_O[0]
     at_rim = tuple(replace(hand, p_OC_O=(rim, *hand.p_OC_O[1:])) for hand in tilted.hands)
+    assert isinstance(tilted.path, Pivot)
     return replace(tilted, hands=at_rim, path=replace(tilted.path, angle_deg=90.0))
 
 

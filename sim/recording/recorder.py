@@ -14,7 +14,7 @@ from rerun.components import AggregationPolicy
 from sim.contacts import true_contacts
 from sim.guard import Mode
 from sim.monitor import ContactHistory
-from sim.path import ScrewPath
+from sim.path import object_path
 from sim.plan import Plan
 from sim.recording.blueprint import TIMELINE, blueprint
 from sim.recording.columns import arrows, scalars, strips
@@ -74,7 +74,7 @@ class Recorder:
         self._scenario = scenario
         self._cones = np.array([_cone(contact.mu) for contact in true_contacts(scenario)])
         self._tau_min, self._tau_max = tau_min, tau_max
-        self._plan, self._axis = plan, ScrewPath(scenario.path).axis
+        self._plan, self._path = plan, object_path(scenario.path)
         self._stride = max(1, round(_POSE_PERIOD / scenario.physics.timestep))
         # Viewers keep the first blueprint they see per application id.
         self._recording = rr.RecordingStream(f"fulcrum {scenario.name}")
@@ -139,7 +139,9 @@ class Recorder:
         tilt = np.degrees(np.column_stack([block.tilt_ref, block.tilt]))
         self._send("tilt", time, tilt)
         self._send("tilt_error", time, tilt[:, 1:] - tilt[:, :1])
-        rate = np.column_stack([block.rate_ref, block.twist_WO[:, 3:] @ self._axis])
+        axis = self._path.axis(block.tilt)
+        turning = np.einsum("ki,ki->k", block.twist_WO[:, 3:], axis)
+        rate = np.column_stack([block.rate_ref, turning])
         self._send("tilt_rate", time, np.degrees(rate))
         normal = np.column_stack([block.w_command_C[..., N], history.w_OC_C[..., N]])
         self._send("normal_force", time, normal)

@@ -10,7 +10,8 @@ import numpy as np
 import rerun as rr
 from scipy.spatial.transform import Rotation
 
-from assets import ROBOTS, description_path
+from assets.mjcf import LOOKS
+from assets.models import looks_of
 from assets.visuals import Visual, link_names, load_visuals
 from sim.recording.blueprint import TIMELINE
 from sim.recording.columns import poses
@@ -47,15 +48,16 @@ class Scenery:
 
     def _dress(self, robot: Robot) -> None:
         """Takes over the meshes of a robot that has some."""
-        description = ROBOTS.get(robot.model)
+        description = looks_of(robot.model)
         if description is None:
             return
-        urdf = description_path(description).read_text()
+        urdf = description.read_text()
         names = {self._model.body(b).name for b in range(self._model.nbody)}
         links = {link for link in link_names(urdf) if robot.prefix + link in names}
-        self._dressed |= {robot.prefix + link for link in links}
-        visuals = load_visuals(urdf, links)
+        visuals = load_visuals(urdf, description, links)
         self._visuals += [replace(v, link=robot.prefix + v.link) for v in visuals]
+        if visuals:
+            self._dressed |= {robot.prefix + link for link in links}
 
     def _primitives(self) -> Iterator[int]:
         """Visible geoms; a robot's own collision primitives only where it has no meshes."""
@@ -68,7 +70,7 @@ class Scenery:
             body = int(self._model.geom_bodyid[g])
             is_own = self._model.geom(g).name in own or body in hands
             is_bare = self._model.body(body).name not in self._dressed
-            if is_own or (is_bare and self._model.geom_group[g] == 0):
+            if is_own or (is_bare and self._model.geom_group[g] in (0, LOOKS)):
                 yield g
 
     def log_shapes(self, recording: rr.RecordingStream) -> None:

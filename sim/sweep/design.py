@@ -10,7 +10,7 @@ from importlib.metadata import version
 from typing import Any
 
 from sim.checks import whole
-from sim.execution import LEAST_TIME, Planning
+from sim.execution import Planning
 from sim.files import finite
 from sim.run import PACKAGES
 from sim.scenario import Scenario
@@ -112,7 +112,7 @@ class Sweep:
             f"--preset {self.preset} --seed {episode.seed}",
         ]
         if self.planning is not None:
-            words.append(f"--plan {LEAST_TIME} --stretch {self.planning.stretch!r}")
+            words.append(self.planning.options)
         if episode.values:
             words.append("--world " + ",".join(f"{n}={v!r}" for n, v in episode.values))
         return " ".join(words)

@@ -9,6 +9,7 @@ import pickle
 import uuid
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from pathlib import Path
 
 import dask
 import pyarrow as pa
@@ -16,9 +17,10 @@ from distributed import Client, KilledWorker, LocalCluster, as_completed
 from distributed.comm.core import CommClosedError
 
 from sim.checks import whole
-from sim.sweep.design import Sweep
+from sim.sweep.design import Episode, Sweep
 from sim.sweep.episode import check_holdable, run_episode
 from sim.sweep.store import Store
+from sim.sweep.summary import Score, scores
 from synthesis import FulcrumError, InvalidInputError
 
 # How long a scheduler may take to answer, and its first worker to come [s].
@@ -65,24 +67,64 @@ class LostEpisodesError(FulcrumError):
         )
 
 
+@dataclass(frozen=True, eq=False)
+class Outcome:
+    """What a sweep gave.
+
+    Attributes:
+        rows: All episodes, one row each.
+        scores: What they come to, by controller.
+    """
+
+    rows: pa.Table
+    scores: tuple[Score, ...]
+
+    def _repr_markdown_(self) -> str:
+        from sim.notebook import outcome_markdown
+
+        return outcome_markdown(self)
+
+
+# One process for each of this machine's processors.
+LOCAL = Workers()
+
+
 def run_sweep(
-    sweep: Sweep, store: Store, workers: Workers, progress: Progress | None = None
-) -> pa.Table:
-    """Runs the episodes that are missing; returns all, one row each.
+    sweep: Sweep, out: Path, workers: Workers = LOCAL, progress: Progress | None = None
+) -> Outcome:
+    """Runs the episodes that are missing in a folder.
 
     Dask gives the episodes of a worker that dies to another one. What has been written survives
     whatever happens to this process: another call with the same folder goes on from there.
 
+    Args:
+        sweep: Who meets which worlds.
+        out: New or empty folder, or one of the same sweep.
+        workers: Who runs the episodes.
+        progress: Called after each.
+
     Raises:
         PathError: The arms cannot follow the path; nothing has been run.
         UnholdableError: A controller finds no forces somewhere on the path; nothing has been run.
-        InvalidInputError: No cluster answers at the address.
+        InvalidInputError: No cluster answers at the address, or the folder holds something else.
         LostEpisodesError: Some episodes killed all workers that tried them.
         KeyboardInterrupt: Somebody pressed Ctrl-C.
     """
+    store = Store(sweep, out)
     missing = store.missing()
-    if not missing:
-        return store.merge()
+    if missing:
+        _run(sweep, store, missing, workers, progress)
+    rows = store.merge()
+    return Outcome(rows, scores(rows, tuple(hand.name for hand in sweep.scenario.hands)))
+
+
+def _run(
+    sweep: Sweep,
+    store: Store,
+    missing: list[Episode],
+    workers: Workers,
+    progress: Progress | None,
+) -> None:
     check_holdable(sweep)
     done, failures = _finished(store)
     total = done + len(missing)
@@ -112,7 +154,6 @@ def run_sweep(
             report(done, total, failures)
     if lost:
         raise LostEpisodesError(lost)
-    return store.merge()
 
 
 def _finished(store: Store) -> tuple[int, int]:

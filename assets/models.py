@@ -1,0 +1,113 @@
+"""Robots and hands by the name of one that ships, or from any URDF or MJCF file."""
+
+from __future__ import annotations
+
+import contextlib
+import hashlib
+from collections.abc import Iterator
+from importlib.metadata import version
+from pathlib import Path
+
+import mujoco
+import numpy as np
+from numpy.typing import NDArray
+
+from assets import HANDS, ROBOTS, asset_path, description_path
+from assets.cache import cached
+from assets.mjcf import tidy
+from assets.packages import ModelError, check_files, named_file, read_xml
+
+# What turns a URDF into MJCF: with another version of any of them the cache does not count.
+_CONVERTERS = ("mujoco", "numpy", "pycollada", "trimesh")
+
+
+def robot_spec(model: str) -> mujoco.MjSpec:
+    """A robot alone, with a motor at each joint; see `assets.mjcf.tidy`.
+
+    Args:
+        model: Name of a robot that ships, or path of a URDF or MJCF file.
+
+    Raises:
+        ModelError: There is none, or it cannot be taken; says why.
+    """
+    path = _path(model, tuple(ROBOTS))
+    spec = _urdf(path) if is_urdf(path) else _mjcf(path)
+    tidy(spec)
+    return spec
+
+
+def hand_spec(model: str) -> mujoco.MjSpec:
+    """A hand, as its file has it.
+
+    Args:
+        model: Name of a hand that ships, or path of an MJCF file.
+
+    Raises:
+        ModelError: There is none, or MuJoCo does not read it.
+    """
+    return _mjcf(_path(model, HANDS))
+
+
+def looks_of(model: str) -> Path | None:
+    """The URDF whose meshes show what a robot looks like; None where there is none.
+
+    Raises:
+        ModelError: There is no such robot.
+    """
+    if model in ROBOTS:
+        description = ROBOTS[model]
+        return None if description is None else description_path(description)
+    path = _path(model, tuple(ROBOTS))
+    return path if is_urdf(path) else None
+
+
+def is_urdf(path: Path) -> bool:
+    """Whether a robot's file is a URDF, rather than MJCF.
+
+    Raises:
+        ModelError: It is neither.
+    """
+    tag = read_xml(path).tag
+    if tag not in ("robot", "mujoco"):
+        raise ModelError(f"{path.name} with the root element {tag}", "a URDF or MJCF file")
+    return tag == "robot"
+
+
+def _path(model: str, shipped: tuple[str, ...]) -> Path:
+    if model in shipped:
+        return asset_path(f"{model}.xml")
+    if not Path(model).is_file():
+        raise ModelError(repr(model), f"one of {', '.join(shipped)}, or the path of a file")
+    return Path(model)
+
+
+def _mjcf(path: Path) -> mujoco.MjSpec:
+    check_files(path)
+    try:
+        return mujoco.MjSpec.from_file(str(path))
+    except ValueError as error:
+        raise ModelError(str(error), "a file that MuJoCo reads") from None
+
+
+def _urdf(path: Path) -> mujoco.MjSpec:
+    """The URDF in MJCF; from the cache, if neither it nor its meshes have changed."""
+    urdf = path.read_text()
+    converters = [Path(__file__).with_name(name) for name in ("urdf.py", "meshes.py")]
+    versions = [version(name) for name in _CONVERTERS]
+    determined_by = [urdf.encode(), *_meshes(path), repr(versions).encode()]
+    determined_by += [file.read_bytes() for file in converters]
+
+    def make() -> list[NDArray]:
+        from assets.urdf import mjcf_of, text  # trimesh takes a third of a second to import
+
+        return [np.frombuffer(text(mjcf_of(urdf, path)).encode(), np.uint8)]
+
+    (mjcf,) = cached(hashlib.sha256(b"\0".join(determined_by)).hexdigest(), make)
+    return mujoco.MjSpec.from_string(mjcf.tobytes().decode())
+
+
+def _meshes(urdf: Path) -> Iterator[bytes]:
+    """Contents of all mesh files that a URDF names, as far as it may name them."""
+    for mesh in read_xml(urdf).iter("mesh"):
+        with contextlib.suppress(ModelError):
+            yield named_file(mesh.get("filename", ""), urdf).read_bytes()

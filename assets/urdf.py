@@ -1,0 +1,240 @@
+"""Turns a robot's URDF into MJCF.
+
+MuJoCo's own URDF reader gives the kinematics and the inertias; the shapes are the URDF's collision
+primitives, with boxes in place of meshes; names, colours, motors and speed limits are added, and
+every number is written with all its digits (`MjSpec.to_xml` keeps only six).
+"""
+
+from __future__ import annotations
+
+import copy
+import re
+import xml.etree.ElementTree as ET
+from collections.abc import Iterable, Mapping
+from pathlib import Path
+
+import mujoco
+import numpy as np
+import trimesh
+from numpy.typing import NDArray
+from trimesh.intersections import slice_faces_plane
+
+from assets.meshes import UNPAINTED, read_mesh
+from assets.packages import ModelError, named_file
+from assets.visuals import named_colors, pose_of, rgba_of, scale_of
+
+PLACEHOLDER = 0.001
+"""Spheres of this radius [m] stand in URDFs where a link has no real collision shape."""
+JOINTS = ("revolute", "continuous", "prismatic", "fixed")
+"""Types of joints that the robot model knows."""
+DEFAULT = """
+<default>
+  <default class="{name}">
+    <geom contype="0" conaffinity="0" mass="0"/>
+  </default>
+</default>"""
+
+Cuts = Mapping[str, tuple[float, ...]]
+
+
+def mjcf_of(urdf: str, description: Path, cuts: Cuts | None = None) -> ET.Element:
+    """A robot in MJCF.
+
+    Masses, centres of mass, inertias, joint frames, ranges, damping and torque limits are those of
+    the URDF; links keep their names and are not fused. Geoms have no mass and touch nothing:
+    contact comes from the explicit `<pair>` elements of a scene. A joint's `user` number is its
+    speed limit; limits that the URDF does not state, or states as 0, are left out.
+
+    Args:
+        urdf: Text of the URDF.
+        description: Its file, from which the mesh files are found.
+        cuts: Heights [m], by link, that cut its meshes into slices with a box each.
+
+    Raises:
+        ModelError: MuJoCo does not read it, a joint is none that the robot model knows, or a mesh
+            is missing or lies outside the URDF's package.
+    """
+    robot = _checked(urdf)
+    shapes = copy.deepcopy(robot)
+    _use_primitives(shapes, description, cuts or {})
+    options = {"fusestatic": "false", "balanceinertia": "false"}
+    ET.SubElement(ET.SubElement(shapes, "mujoco"), "compiler", options)
+    try:
+        spec = mujoco.MjSpec.from_string(ET.tostring(shapes, encoding="unicode"))
+        for body in spec.bodies:
+            for index, geom in enumerate(body.geoms):
+                geom.name = body.name if len(body.geoms) == 1 else f"{body.name}_{index}"
+        spec.compile()
+    except ValueError as error:
+        raise ModelError(str(error), "a URDF that MuJoCo reads") from None
+    mjcf = ET.fromstring(spec.to_xml())
+    _write_all_digits(mjcf, spec)
+    _dress(mjcf, robot)
+    return mjcf
+
+
+def text(mjcf: ET.Element) -> str:
+    """MJCF as indented text."""
+    ET.indent(mjcf)
+    return ET.tostring(mjcf, encoding="unicode") + "\n"
+
+
+def without_branches(urdf: str, joints: tuple[str, ...]) -> str:
+    """The URDF without the given joints and all links and joints that hang from them.
+
+    Notes for Gazebo and ROS transmissions go too, since they may name what is removed; all other
+    elements stay as they are.
+
+    Raises:
+        ValueError: If a joint is missing; the message lists the valid ones.
+    """
+    robot = ET.fromstring(urdf)
+    links = {joint.attrib["name"]: _ends(joint) for joint in robot.findall("joint")}
+    for missing in (joint for joint in joints if joint not in links):
+        raise ValueError(f"joint: got {missing!r}; valid is one of {', '.join(links)}.")
+    removed = {links[joint][1] for joint in joints}
+    while more := {child for parent, child in links.values() if parent in removed} - removed:
+        removed |= more
+    for element in list(robot):
+        gone = element.tag in ("gazebo", "transmission")
+        gone |= element.tag == "link" and element.attrib["name"] in removed
+        gone |= element.tag == "joint" and _ends(element)[1] in removed
+        if gone:
+            robot.remove(element)
+    return ET.tostring(robot, encoding="unicode")
+
+
+def _checked(urdf: str) -> ET.Element:
+    """The robot, with nothing but its links, joints and materials."""
+    robot = ET.fromstring(urdf)
+    for element in list(robot):
+        if str(element.tag).startswith(("xacro:", "{http://www.ros.org/wiki/xacro}")):
+            raise ModelError("a file with xacro macros", "a URDF made from it with `xacro`")
+        if element.tag not in ("link", "joint", "material"):
+            robot.remove(element)
+    for joint in robot.findall("joint"):
+        kind = joint.get("type")
+        if kind not in JOINTS:
+            given = f"joint {joint.get('name')} of type {kind}"
+            raise ModelError(given, f"one of type {', '.join(JOINTS)}")
+        # A joint that follows another in the robot's controller is a joint like any other here.
+        for mimic in joint.findall("mimic"):
+            joint.remove(mimic)
+    return robot
+
+
+def _use_primitives(robot: ET.Element, description: Path, cuts: Cuts) -> None:
+    """Leaves each link only primitive collision shapes: its own, else its visual's, else boxes."""
+    for link in robot.findall("link"):
+        visuals, collisions = link.findall("visual"), link.findall("collision")
+        shapes = [shape for shape in collisions if not _is_placeholder(shape)] or visuals
+        for shape in visuals + collisions:
+            link.remove(shape)
+        for shape in shapes:
+            if shape.find("geometry/mesh") is None:
+                ET.SubElement(link, "collision").extend(shape.findall("*"))
+            else:
+                link.extend(_boxes(shape, description, cuts.get(link.attrib["name"], ())))
+
+
+def _is_placeholder(shape: ET.Element) -> bool:
+    sphere = shape.find("geometry/sphere")
+    return sphere is not None and float(sphere.attrib["radius"]) <= PLACEHOLDER
+
+
+def _boxes(shape: ET.Element, description: Path, cuts: tuple[float, ...]) -> list[ET.Element]:
+    """Boxes along the link's axes around the slices of a mesh, rounded to 0.1 mm."""
+    mesh = shape.find("geometry/mesh")
+    assert mesh is not None
+    file = named_file(mesh.get("filename", ""), description)
+    boxes = []
+    for low, high in zip((-np.inf, *cuts), (*cuts, np.inf), strict=True):
+        points = [
+            _slice(part.apply_transform(pose_of(shape)), low, high)
+            for part in read_mesh(file, scale_of(mesh))
+        ]
+        lower, upper = np.vstack(points).min(axis=0), np.vstack(points).max(axis=0)
+        box = ET.Element("collision")
+        ET.SubElement(box, "origin", xyz=_digits(np.round((lower + upper) / 2, 4)))
+        geometry = ET.SubElement(box, "geometry")
+        ET.SubElement(geometry, "box", size=_digits(np.round(upper - lower, 4)))
+        boxes.append(box)
+    return boxes
+
+
+def _slice(part: trimesh.Trimesh, low: float, high: float) -> NDArray[np.float64]:
+    """(n, 3) vertices of the part of a mesh between two heights [m]."""
+    vertices, faces = part.vertices, part.faces
+    for height, up in ((low, 1.0), (high, -1.0)):
+        if np.isfinite(height):
+            vertices, faces, *_ = slice_faces_plane(vertices, faces, (0, 0, up), (0, 0, height))
+    return vertices[np.unique(faces)]
+
+
+def _link_colors(robot: ET.Element) -> dict[str, tuple[float, ...]]:
+    """The URDF's colour of each link; a link without one has its parent's."""
+    named = named_colors(robot)
+    colors = {link.attrib["name"]: rgba_of(link, named) for link in robot.findall("link")}
+    parents = {child: parent for parent, child in map(_ends, robot.findall("joint"))}
+
+    def inherited(link: str) -> tuple[float, ...]:
+        return colors[link] or (inherited(parents[link]) if link in parents else UNPAINTED)
+
+    return {link: inherited(link) for link in colors}
+
+
+def _dress(mjcf: ET.Element, robot: ET.Element) -> None:
+    """Adds what the URDF reader leaves out: default class, colours, speed limits and motors."""
+    worldbody = mjcf.find("worldbody")
+    assert worldbody is not None
+    name = re.sub(r"\W", "_", robot.get("name", "robot"))
+    mjcf.insert(list(mjcf).index(worldbody), ET.fromstring(DEFAULT.format(name=name)))
+    for root in worldbody.findall("body"):
+        root.set("childclass", name)
+    colors = _link_colors(robot)
+    for body in worldbody.iter("body"):
+        for geom in body.findall("geom"):
+            geom.set("rgba", _digits(colors[body.attrib["name"]]))
+    motors = ET.SubElement(mjcf, "actuator")
+    for joint in worldbody.iter("joint"):
+        name = joint.attrib["name"]
+        limit = robot.find(f"joint[@name='{name}']/limit")
+        stated = {} if limit is None else limit.attrib
+        effort, speed = (float(stated.get(key, 0.0)) for key in ("effort", "velocity"))
+        motor = ET.SubElement(motors, "motor", name=name, joint=name)
+        if speed > 0.0:
+            joint.set("user", _digits([speed]))
+        if effort > 0.0:
+            motor.set("ctrlrange", _digits([-effort, effort]))
+
+
+def _write_all_digits(mjcf: ET.Element, spec: mujoco.MjSpec) -> None:
+    """Puts the numbers of the spec in place of the rounded ones, inertias as the URDF has them."""
+    for tag, find in (("body", spec.body), ("joint", spec.joint), ("geom", spec.geom)):
+        for element in mjcf.findall(f"./worldbody//{tag}"):
+            source = find(element.attrib["name"])
+            for key in {"pos", "quat", "size", "range"} & element.attrib.keys():
+                count = len(element.attrib[key].split())
+                element.set(key, _digits(np.atleast_1d(getattr(source, key))[:count]))
+    for body in mjcf.findall("./worldbody//body"):
+        inertial, source = body.find("inertial"), spec.body(body.attrib["name"])
+        if inertial is not None:
+            inertial.attrib.clear()
+            inertial.set("pos", _digits(source.ipos))
+            inertial.set("mass", _digits([source.mass]))
+            full = np.isfinite(source.fullinertia).all()  # a diagonal that is all zero is not
+            key, moments = ("full", source.fullinertia) if full else ("diag", source.inertia)
+            inertial.set(f"{key}inertia", _digits(moments))
+
+
+def _digits(values: Iterable[float]) -> str:
+    """Shortest text that reads back as the same numbers."""
+    return " ".join(repr(float(value) + 0.0).removesuffix(".0") for value in values)
+
+
+def _ends(joint: ET.Element) -> tuple[str, str]:
+    """Names of the parent and the child link of a joint."""
+    parent, child = joint.find("parent"), joint.find("child")
+    if parent is None or child is None:
+        raise ModelError(f"joint {joint.get('name')}", "one with a parent and a child")
+    return parent.attrib["link"], child.attrib["link"]
