@@ -28,6 +28,7 @@ from scenarios.common import (
 )
 from scenarios.new import New
 from scenarios.paper.command import Reproduce
+from scenarios.place import Place
 from scenarios.planning import Plan
 from scenarios.sweep import Sweep
 
@@ -218,6 +219,7 @@ Command = (
     | Annotated[Check, tyro.conf.subcommand("check")]
     | Annotated[New, tyro.conf.subcommand("new")]
     | Annotated[Capacity, tyro.conf.subcommand("capacity")]
+    | Annotated[Place, tyro.conf.subcommand("place")]
     | Annotated[Plan, tyro.conf.subcommand("plan")]
     | Annotated[Reproduce, tyro.conf.subcommand("reproduce")]
     | Annotated[Sweep, tyro.conf.subcommand("sweep")]
@@ -248,7 +250,20 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 def _parse(
     arguments: Sequence[str] | None,
-) -> List | Run | Screenshot | View | Explain | Check | New | Capacity | Plan | Reproduce | Sweep:
+) -> (
+    List
+    | Run
+    | Screenshot
+    | View
+    | Explain
+    | Check
+    | New
+    | Capacity
+    | Place
+    | Plan
+    | Reproduce
+    | Sweep
+):
     """The command asked for; a parse error leaves as one line instead of tyro's box."""
     errors = io.StringIO()
     try:

@@ -13,25 +13,15 @@ from scipy.interpolate import CubicSpline
 from scipy.spatial.transform import Rotation
 
 from assets import velocity_limits
+from sim.collisions import DETECTION, collision_pairs, distance
 from sim.contacts import ContactFrames
 from sim.path import object_path
 from sim.scenario import Scenario
-from sim.scene import (
-    ObjectMotion,
-    compose,
-    is_solid,
-    joint_ranges,
-    tip_geom,
-    tip_site,
-    unwanted_pairs,
-)
+from sim.scene import ObjectMotion, compose, joint_ranges, tip_geom, tip_site
 from sim.schedule import Schedule
 from synthesis import FulcrumError, InvalidInputError
 from synthesis.contact import Array
 
-# A cubic spline through these steps follows the hands to under a micrometre.
-_STEP_DEG, _STEP_M = 1.0, 0.005
-_SMALLEST_STEPS = 4
 _ITERATIONS = 50
 # Pose error at which a step counts as solved [m and rad].
 _SOLVED = 1e-9
@@ -40,8 +30,6 @@ _DAMPING = 1e-8
 # Longest step of a joint while the start is sought [rad or m]: longer ones leave the region where
 # the task is linear, and an arm that is out of reach ends far from it, at limits of no concern.
 _START_STEP = 0.05
-# Clearance that links keep from each other and from the scene, and from where they look out [m].
-_CLEARANCE, _DETECTION = 0.005, 0.05
 # How near to a limit counts as being at it [rad, m, or share of the speed limit].
 _AT_LIMIT = 1e-3
 _NAMED_COLLISIONS = 3
@@ -49,12 +37,40 @@ _NAMED_COLLISIONS = 3
 _STILL_DAMPING = 1e-2
 
 
-class PathError(FulcrumError):
-    """The arms cannot follow the object's path; says at which tilt, and which limit stops."""
+@dataclass(frozen=True)
+class Grid:
+    """Steps of a joint path.
 
-    def __init__(self, tilt: float, gap: float, error: float, reasons: list[str]) -> None:
+    A cubic spline through the steps left out here follows the hands to under a micrometre.
+
+    Attributes:
+        tilt_deg: Largest step of the tilt [deg].
+        gap_m: Largest step of the hands' distance from their contacts [m].
+        least: Steps of a phase, at least.
+        clearance_m: That links keep from each other and from the scene at the steps [m].
+    """
+
+    tilt_deg: float = 1.0
+    gap_m: float = 0.005
+    least: int = 4
+    clearance_m: float = 0.005
+
+
+class PathError(FulcrumError):
+    """The arms cannot follow the object's path; says at which tilt, and which limit stops.
+
+    Attributes:
+        tilt_deg: [deg].
+        error: Of the hands' poses where they got stuck [m and rad].
+        share: Of the manoeuvre's steps, as they are planned, that were solved before [-].
+        reasons: Limits that stop the arms.
+    """
+
+    def __init__(
+        self, tilt: float, gap: float, error: float, reasons: list[str], share: float = 0.0
+    ) -> None:
         self.tilt_deg = float(np.degrees(tilt))
-        self.reasons = reasons
+        self.error, self.share, self.reasons = error, share, reasons
         super().__init__(
             f"inverse kinematics cannot follow the path at a tilt of {self.tilt_deg:.1f} deg with "
             f"the hands {1e3 * gap:.0f} mm off their contacts (pose error {error:.2g} m/rad): "
@@ -111,17 +127,18 @@ class JointPath:
         raise InvalidInputError("tilt", given, f"between 0 and {np.degrees(end):g} deg")
 
 
-def plan_joints(scenario: Scenario, solved: float = _SOLVED) -> JointPath:
+def plan_joints(scenario: Scenario, solved: float = _SOLVED, grid: Grid | None = None) -> JointPath:
     """Follows the manoeuvre with all hands, within joint, speed and collision limits.
 
     Args:
         scenario: The scene.
         solved: Pose error at which a step counts as solved [m and rad].
+        grid: Steps; those of :class:`Grid` if left out.
 
     Raises:
         PathError: A limit stops the arms; names it and the tilt.
     """
-    return _Follower(scenario, solved).follow()
+    return _Follower(scenario, solved, grid or Grid()).follow()
 
 
 class _Target(NamedTuple):
@@ -130,9 +147,10 @@ class _Target(NamedTuple):
 
 
 class _Follower:
-    def __init__(self, scenario: Scenario, solved: float) -> None:
+    def __init__(self, scenario: Scenario, solved: float, grid: Grid) -> None:
         self._scenario, self._path = scenario, object_path(scenario.path)
-        self._solved = solved
+        self._solved, self._grid = solved, grid
+        self._done, self._steps = 0, 1
         self._schedule = Schedule(scenario)
         self._frames = ContactFrames(scenario)
         spec = compose(scenario, ObjectMotion.POSED)
@@ -158,15 +176,16 @@ class _Follower:
         self._pose_object(0.0)
         self._collisions = mink.CollisionAvoidanceLimit(
             model,
-            self._collision_pairs(),
-            minimum_distance_from_collisions=_CLEARANCE,
-            collision_detection_distance=_DETECTION,
+            collision_pairs(scenario, model, self._configuration.data),
+            minimum_distance_from_collisions=grid.clearance_m,
+            collision_detection_distance=DETECTION,
         )
 
     def follow(self) -> JointPath:
         phases = self._schedule.phases
         touched = next((i for i, p in enumerate(phases) if p.gap == 0.0), len(phases) - 1)
         # The approach is planned backwards, so that the arms hold from the posture that was sought.
+        self._steps = 1 + sum(len(self._targets(i)[1]) - 1 for i in range(len(phases)))
         self._reach(_Target(phases[touched].tilt * self._path.end, phases[touched].gap), None)
         holding = self._configuration.q.copy()
         planned = [self._follow(i, backwards=True) for i in range(touched, -1, -1)][::-1]
@@ -194,9 +213,10 @@ class _Follower:
     def _targets(self, index: int) -> tuple[Array, list[_Target]]:
         """Grid of a phase's progress, fine enough for its motion, and what to reach there."""
         phase, before = self._schedule.phases[index], self._schedule.before(index)
+        own = self._grid
         degrees = abs(phase.tilt - before.tilt) * np.degrees(self._path.end)
         distance = abs(phase.gap - before.gap)
-        steps = max(_SMALLEST_STEPS, int(np.ceil(max(degrees / _STEP_DEG, distance / _STEP_M))))
+        steps = max(own.least, int(np.ceil(max(degrees / own.tilt_deg, distance / own.gap_m))))
         grid = np.linspace(0.0, 1.0, steps + 1)
         tilts = self._path.end * (before.tilt + (phase.tilt - before.tilt) * grid)
         gaps = before.gap + (phase.gap - before.gap) * grid
@@ -234,7 +254,9 @@ class _Follower:
         if duration is not None:
             too_fast = moved >= (1.0 - _AT_LIMIT) * duration * self._qd_max
         if not self._error() < self._solved or too_fast.any():  # a NaN is no solution
-            raise PathError(target.tilt, target.gap, self._error(), self._reasons(too_fast))
+            reasons, share = self._reasons(too_fast), self._done / self._steps
+            raise PathError(target.tilt, target.gap, self._error(), reasons, share)
+        self._done += 1
 
     def _tip_poses(self, target: _Target) -> list[mink.SE3]:
         """Poses in the world of the hands' tips that face their contacts across the gap."""
@@ -254,7 +276,7 @@ class _Follower:
         )
 
     def _reasons(self, too_fast: Array) -> list[str]:
-        model, q = self._model, self._configuration.q
+        model, data, q = self._model, self._configuration.data, self._configuration.q
         reasons = []
         for j in range(model.njnt):
             name, (low, high) = model.joint(j).name, joint_ranges(model)[j]
@@ -265,20 +287,17 @@ class _Follower:
                 reasons.append(f"{name} at its lower limit {low:.3f} {unit}")
             if high - q[j] < _AT_LIMIT:
                 reasons.append(f"{name} at its upper limit {high:.3f} {unit}")
+        near_m = self._grid.clearance_m
         near = sorted(
-            (distance, first, second)
+            (apart, first, second)
             for first, second in self._collisions.geom_id_pairs
-            if (distance := self._distance(first, second)) < _CLEARANCE + _AT_LIMIT
+            if (apart := distance(model, data, first, second)) < near_m + _AT_LIMIT
         )
         reasons += [
-            f"{model.geom(first).name} within {_CLEARANCE * 1e3:g} mm of {model.geom(second).name}"
+            f"{model.geom(first).name} within {1e3 * near_m:g} mm of {model.geom(second).name}"
             for _, first, second in near[:_NAMED_COLLISIONS]
         ]
         return reasons or ["out of reach of the arms"]
-
-    def _distance(self, first: int, second: int) -> float:
-        data = self._configuration.data
-        return mujoco.mj_geomDistance(self._model, data, first, second, _DETECTION, None)
 
     def _pose_object(self, tilt: float) -> None:
         R_WO, p_WO = self._path.pose(tilt)
@@ -286,37 +305,3 @@ class _Follower:
         data.mocap_pos[self._object] = p_WO
         data.mocap_quat[self._object] = Rotation.from_matrix(R_WO).as_quat(scalar_first=True)
         self._configuration.update()
-
-    def _collision_pairs(self) -> list[tuple[list[str], list[str]]]:
-        """Links against links, object and environment; not the tips against what they touch.
-
-        Left out, as the collision primitives of joint housings overlap by construction: link
-        pairs with at most three joints between them, and those that overlap in the start posture.
-        """
-        model, scenario = self._model, self._scenario
-        surroundings = [g.name for g in (*scenario.object.geoms, *scenario.environment)]
-        names = [g.name for g in map(model.geom, range(model.ngeom)) if is_solid(g)]
-        links = [name for name in names if name not in surroundings]
-        moving = [name for name in links if model.body_weldid[model.geom(name).bodyid[0]] != 0]
-        pairs = [([link], [other]) for link, other in unwanted_pairs(scenario, model)]
-        for i, link in enumerate(moving):
-            for other in (*moving[i + 1 :], *(name for name in links if name not in moving)):
-                first, second = model.geom(link), model.geom(other)
-                if not self._near_in_chain(first.bodyid[0], second.bodyid[0]) and (
-                    self._distance(first.id, second.id) > 0.0
-                ):
-                    pairs.append(([link], [other]))
-        return pairs
-
-    def _near_in_chain(self, first: int, second: int) -> bool:
-        """Whether at most three joints lie between two bodies of one chain."""
-        a, b = self._ancestors(first), self._ancestors(second)
-        return a[0] in b or b[0] in a
-
-    def _ancestors(self, body: int) -> list[int]:
-        """The body and the next three that a joint carries it on, each by its weld group."""
-        weld, parent = self._model.body_weldid, self._model.body_parentid
-        chain = [int(weld[body])]
-        for _ in range(3):
-            chain.append(int(weld[parent[chain[-1]]]))
-        return chain

@@ -131,7 +131,7 @@ def _run(
     lost = []
     report = progress or (lambda done, total, failures: None)
     report(done, total, failures)
-    with _cluster(workers) as client:
+    with cluster(workers) as client:
         store.begin()
         packed = pickle.dumps(sweep)  # small, and sent along: what is scattered dies with workers
         mark = uuid.uuid4().hex  # a shared cluster knows tasks of others
@@ -165,8 +165,12 @@ def _finished(store: Store) -> tuple[int, int]:
 
 
 @contextlib.contextmanager
-def _cluster(workers: Workers) -> Iterator[Client]:
-    """A client of the cluster; one of its own processes ends with it."""
+def cluster(workers: Workers) -> Iterator[Client]:
+    """A client of the cluster; one of its own processes ends with it.
+
+    Raises:
+        InvalidInputError: No cluster answers at the address.
+    """
     with contextlib.ExitStack() as stack:
         if workers.scheduler is None:
             logging.getLogger("distributed").setLevel(logging.CRITICAL)
