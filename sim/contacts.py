@@ -31,6 +31,20 @@ def true_contacts(scenario: Scenario) -> tuple[Contact, ...]:
     return contacts(scenario, Control(friction_factor=1.0, preload=0.0))
 
 
+def shared_places(scenario: Scenario) -> tuple[tuple[int, ...], ...]:
+    """Indices of the supports that hold the same point of the object, for every such point.
+
+    Two surfaces share what holds a point; how, is not for statics to say.
+    """
+    points = [support.p_OP_O for support in scenario.supports]
+    first = len(scenario.hands)
+    places = [
+        tuple(first + i for i, point in enumerate(points) if point == place)
+        for place in dict.fromkeys(points)
+    ]
+    return tuple(place for place in places if len(place) > 1)
+
+
 def _contact(
     name: str, role: Role, friction: Friction, factor: float, preload: float, f_n_max: float
 ) -> Contact:

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from sim.contacts import shared_places
 from sim.guard import Event
 from sim.monitor import ContactHistory
 from sim.report import (
@@ -38,6 +39,7 @@ class Judge:
         self._joints = joints
         self._tau_min, self._tau_max = tau_min, tau_max
         self._schedule = Schedule(scenario)
+        self._shared = shared_places(scenario)
 
     def report(self, info: RunInfo, trace: Trace, history: ContactHistory) -> Report:
         """The report of a run of at least one step."""
@@ -55,6 +57,8 @@ class Judge:
             failures = [f"The run was interrupted at {trace.t[-1]:.2f} s."]
         else:
             found = self._contact_failures(trace, history, held, contacts)
+            for place in self._shared:
+                found += self._place_failures(place, trace, history, held)
             found += self._hand_failures(trace, history, free)
             found += self._tilt_failures(tilt, trace)
             found += [_collision(*names, t) for names, t in info.collisions.items()]
@@ -147,6 +151,8 @@ class Judge:
                 allowed = f"more than the allowed {limits.spin_deg:g} deg"
                 text = f"Contact {name} spun {allowed} at {{when}}."
                 failures.append(_failure(trace, spin, text))
+            if any(i in place for place in self._shared):
+                continue  # what is left is judged for the place as a whole
             used = held & (history.utilisation[:, i] > limits.utilisation)
             if used.any():
                 text = (
@@ -164,6 +170,31 @@ class Judge:
                 )
                 failures.append(_failure(trace, held_rows, text))
         return failures
+
+    def _place_failures(
+        self, place: tuple[int, ...], trace: Trace, history: ContactHistory, held: Mask
+    ) -> list[_Failure]:
+        """The force of supports that hold the same point; how they share it is indeterminate.
+
+        So is how much of its friction one of them uses; whether it sticks is what slip says.
+        """
+        here = np.ix_(held, np.array(place))
+        if not held.any() or not history.kept[here].all():
+            return []
+        measured, commanded = (
+            np.einsum("kmij,kmj->ki", history.R_WC[here], wrenches[here][..., :3])
+            for wrenches in (history.w_OC_C, trace.w_command_C)
+        )
+        off = _rms(np.linalg.norm(measured - commanded, axis=1))
+        allowed = self._scenario.tolerances.force_error * np.linalg.norm(commanded, axis=1).max()
+        if off <= allowed:
+            return []
+        names = " and ".join(self._scenario.contact_names[i] for i in place)
+        text = (
+            f"Contacts {names} together followed their commanded force only to {off:.3g} N RMS "
+            f"(allowed {allowed:.3g} N)."
+        )
+        return [_failure(trace, held, text)]
 
     def _hand_failures(self, trace: Trace, history: ContactHistory, free: Mask) -> list[_Failure]:
         """Impacts while hands come and go, and hands that touch an object that stands alone."""

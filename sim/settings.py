@@ -302,8 +302,10 @@ class Tolerances:
         error_deg: Tilt error at any time [deg].
         slip_mm: Drift of the touching material points, and the integral of tangential speed [mm].
         spin_deg: Turn about the contact normal [deg].
-        utilisation: Friction utilisation in the plant [-].
-        force_error: RMS of measured minus commanded normal force over the peak commanded one [-].
+        utilisation: Friction utilisation in the plant [-]; not of supports that hold the same
+            point, which share it as they happen to.
+        force_error: RMS of measured minus commanded normal force over the peak commanded one [-];
+            of supports that hold the same point that of their force together.
         saturated_s: How long a torque may be cut at its limit at a stretch [s].
     """
 

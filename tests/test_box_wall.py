@@ -8,11 +8,16 @@ import pytest
 from scenarios import scenario
 from sim.path import object_path
 from sim.poses import PathProblems
+from sim.report import Verdict
 from sim.scenario import Friction
 from sim.settings import controllers
 from synthesis import InfeasibleError, Synthesizer
+from synthesis.contact import N
+from tests.runs import run
+from tests.short_run import INFO, judge_of
 
 WALL = scenario("box-wall")
+FOOT_LEFT = WALL.contact_names.index("foot_left")
 
 
 def holdable(scene, controller, tilt_deg):
@@ -54,3 +59,19 @@ def test_the_box_ends_past_its_balance_with_its_face_on_the_wall():
     top = p_WO + R_WO @ [depth / 2, 0.0, height / 2]
     gap = np.dot(np.subtract(top, WALL.path.point_W), wall.normal_W)
     assert gap == pytest.approx(height * np.sin(np.radians(1.0)), abs=1e-12)
+
+
+def test_supports_at_one_place_are_judged_by_the_force_there():
+    outcome = run("box-wall", "default")
+    assert outcome.report.verdict is Verdict.PASS, outcome.report.failures
+    contacts, limits = outcome.report.contacts, WALL.tolerances
+    # Alone the foot is far from its commanded force, and its friction is used up.
+    peak = outcome.trace.w_command_C[:, FOOT_LEFT, N].max()
+    assert contacts["foot_left"].force_error_rms_n > 5 * limits.force_error * peak
+    assert contacts["foot_left"].max_utilisation > limits.utilisation
+    # What is not there is missed, also where the wall would only have to take more.
+    less = outcome.history.w_OC_C.copy()
+    less[:, FOOT_LEFT, :3] *= 0.7
+    history = replace(outcome.history, w_OC_C=less)
+    (failure,) = judge_of(WALL).report(INFO, outcome.trace, history).failures
+    assert failure.startswith("Contacts foot_left and wall_left together followed")
