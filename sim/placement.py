@@ -45,7 +45,7 @@ _SPREAD = 0.25
 # CMA-ES ends when the costs of its samples lie as near together as this.
 _ALIKE = 1e-5
 # Candidates looked at in full, and how far apart they are, at least, in some number [-].
-_FINALISTS, _APART = 6, 0.01
+_FINALISTS, _APART = 4, 0.01
 # What has to be gained, as a share of the cost: less is noise.
 _GAIN = 1e-3
 # Share of the time that is kept for the candidates.

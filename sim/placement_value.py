@@ -110,8 +110,7 @@ def assess(
 
     Args:
         scenario: The scene.
-        control: The controller, whose friction factor and preload count; of a robust one the
-            least friction of its uncertainty set, and its preload.
+        control: The controller, whose friction factor and preload count (see :func:`believed`).
         goal: What the cost is.
         steps: How closely it is looked at.
         tolerated: Pairs of geoms that may touch at the start (see :func:`touching`).
@@ -196,18 +195,14 @@ def over_tilt(
 
 
 def believed(control: Control, scenario: Scenario) -> Control:
-    """The fixed margins that stand for a control's: those of a robust one are its set's worst."""
-    if control.robustness is None:
-        return control
+    """The fixed margins that stand for a control's: of a robust one its own, and its preload."""
     robustness = control.robustness
-    # Hands that cannot press so hard press as hard as they can.
-    preload = min(robustness.preload, *(hand.f_n_max for hand in scenario.hands))
-    return replace(
-        control,
-        friction_factor=1.0 - robustness.uncertainty.friction,
-        preload=max(control.preload, preload),
-        robustness=None,
-    )
+    if robustness is None:
+        return control
+    # Hands that may not press so hard bear what they can (see sim.robust).
+    able = all(hand.f_n_max > robustness.preload for hand in scenario.hands)
+    preload = max(control.preload, robustness.preload) if able else control.preload
+    return replace(control, preload=preload, robustness=None)
 
 
 def settled(scenario: Scenario) -> Scenario:
