@@ -9,9 +9,10 @@ from pydantic import Field
 
 from scenarios.file_keys import NotNegative, Number, Positive, Table, Text, Vector3
 from sim.scenario import View
-from sim.settings import STANDOFF, Control, Guard, Physics, Tolerances
+from sim.settings import REACH, STANDOFF, Control, Guard, Physics, Tolerances
 from synthesis import Objective
 
+APPROACH, TOUCH, GRIP = REACH
 Seconds = Annotated[Number, Gt(0.0), Le(600.0)]
 Share = Annotated[Number, Field(ge=0.0, le=1.0)]
 Fraction = Annotated[Number, Field(ge=0.0, lt=1.0)]
@@ -41,6 +42,15 @@ class PhaseTable(Table):
 class ManoeuvreTable(Table):
     """Timing of the phases: approach, touch, grip, tilt, and what comes then."""
 
+    approach_s: Seconds = APPROACH.duration_s
+    """Duration in which the hands come near [s]."""
+
+    touch_s: Seconds = TOUCH.duration_s
+    """Duration of the last 5 mm to their contacts [s]: heavy links touch hard."""
+
+    grip_s: Seconds = GRIP.duration_s
+    """Duration in which the grip builds up [s]."""
+
     tilt_s: Seconds = 8.0
     """Duration of the tilt [s]."""
 
@@ -51,7 +61,7 @@ class ManoeuvreTable(Table):
     """Distance of the hands from their contacts at the start [m]."""
 
     phases: list[PhaseTable] | None = None
-    """All phases one by one, instead of tilt_s and after."""
+    """All phases one by one, instead of durations and after."""
 
 
 class RobustnessTable(Table):

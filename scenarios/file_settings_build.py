@@ -39,8 +39,10 @@ def phases(source: Source, table: ManoeuvreTable) -> tuple[Phase, ...]:
         if table.after == "leave":
             standoff = table.standoff_m
             after = tuple(replace(p, gap=standoff) if p.gap > 0.0 else p for p in LEAVE)
-        return stretched((*REACH, *TILT, *after), table.tilt_s)
-    for name in ("tilt_s", "after"):
+        lasts = (table.approach_s, table.touch_s, table.grip_s)
+        reach = (replace(p, duration_s=d) for p, d in zip(REACH, lasts, strict=True))
+        return stretched((*reach, *TILT, *after), table.tilt_s)
+    for name in ("approach_s", "touch_s", "grip_s", "tilt_s", "after"):
         if name in table.model_fields_set:
             given = getattr(table, name)
             raise source.error(("manoeuvre", name), given, "left out where phases are given")

@@ -180,6 +180,8 @@ def test_phases_are_those_of_the_manoeuvre_or_said_one_by_one(folder):
     s = said(folder, ('[manoeuvre]\ntilt_s = 8.0\nafter = "leave"', own))
     assert [(phase.name, phase.duration_s) for phase in s.phases] == [("turn", 2.0)]
     assert (s.tolerances.slip_mm, s.control.objective) == (0.3, "max-torque")
+    slow = ("tilt_s = 8.0", "approach_s = 2\ntouch_s = 3\ngrip_s = 4\ntilt_s = 5")
+    assert [p.duration_s for p in said(folder, slow).phases[:4]] == [2.0, 3.0, 4.0, 5.0]
     names = [phase.name for phase in said(folder).phases]
     held = [p.name for p in said(folder, ('after = "leave"', 'after = "hold"')).phases]
     assert (names[-1], held[-1]) == ("stand", "hold")
