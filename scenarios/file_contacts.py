@@ -26,8 +26,9 @@ from scenarios.file_places import (
 from sim.scenario import Geom, Hand, Pose, Support, Vector
 from synthesis.contact import Array
 
-# How far from perpendicular a tangent may be typed in [-].
-_ACROSS = 1e-6
+# How far from perpendicular a tangent may be typed in [-]: places are given to a micrometre, on
+# which the normal of a curved face depends. Less than the second is none.
+_ACROSS, _EXACT = 1e-3, 1e-12
 
 
 def make_hand(thing: Thing, name: str, table: HandTable, places: Places) -> Hand:
@@ -158,7 +159,11 @@ def _tangent(source: Source, key: Key, given: list[float] | None, normal: Vector
     if not abs(np.dot(tangent, normal)) < _ACROSS:
         valid = f"a direction across the normal {_shown(normal)}"
         raise source.error((*key, "tangent"), given, valid)
-    return tangent
+    along = np.dot(tangent, normal)
+    if abs(along) < _EXACT:
+        return tangent
+    across_it = np.subtract(tangent, along * np.asarray(normal))
+    return direction(across_it / np.linalg.norm(across_it))
 
 
 def _direction(source: Source, key: Key, values: list[float]) -> Vector:
