@@ -124,5 +124,7 @@ class Poses:
 
 
 def _scaled(pose: Pose, factor: float, point: Array) -> Pose:
-    x, y, z = (point + factor * (np.asarray(pose.position) - point)).tolist()
+    p_WO = np.asarray(pose.position)
+    # Of a factor of 1 not even the last bit differs.
+    x, y, z = (p_WO + (factor - 1.0) * (p_WO - point)).tolist()
     return replace(pose, position=(x, y, z))
