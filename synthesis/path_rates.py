@@ -93,7 +93,6 @@ class RateCones:
             problem: With a force rate and more than one grid point.
             pace: b [1/s^2], (K,), positive between the ends.
             time: Unit of time [s].
-
         """
         assert problem.force_rate is not None
         self._rows = rows
@@ -130,7 +129,8 @@ class RateCones:
         for i, contact in enumerate(load.problems[0].contacts):
             own = np.flatnonzero((facts.flat // 6 == i) & (facts.flat % 6 <= N))
             h = np.tile([1.5] + [0.0] * len(own), (len(self._s), 1))
-            rows = self._rows.new(h, self._s, [f"force rate of {contact.name}"] * (1 + len(own)))
+            names, scale = [f"force rate of {contact.name}"] * h.shape[1], self._largest / unit
+            rows = self._rows.new(h, self._s, names, scale=scale)
             self._rows.add(self._slopes.data, rows[head, 0], b[point])
             entries = weight[:, None] * facts.scale[own]
             self._rows.add(entries, rows[change, 1:], columns[station][:, own])

@@ -86,7 +86,9 @@ def _within_force_rate(problem: PathProblem) -> PathSolution:
     spent = [found]
     for halvings in range(_HALVINGS + 1):
         try:
-            found = _settled(quick, found.b / 4.0**halvings)
+            pace = found.b / 4.0**halvings
+            pace[[0, -1]] = found.b[[0, -1]]
+            found = _settled(quick, pace)
             break
         except (InfeasiblePathError, SolverError):
             if halvings == _HALVINGS:

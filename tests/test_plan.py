@@ -296,6 +296,7 @@ def test_the_lift_has_no_plan():
         {"grip_max": 4.0},
         {"tip_speed": 0.0},
         {"tip_acceleration": math.nan},
+        {"force_rate": 0.0},
     ],
 )
 def test_senseless_margins_are_refused_by_name(wrong):
