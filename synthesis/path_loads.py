@@ -34,6 +34,8 @@ _KNOWN = 3
 def solve_many(problem: PathProblem) -> PathSolution:
     """The optimal timing and grip, and forces with every load, as :func:`solve_path` finds them.
 
+    With least effort or a force rate all loads are solved together, which takes long for many.
+
     Raises:
         InfeasiblePathError: No timing and grip serve all loads; says where and which limits.
         UnboundedError: The objective improves without limit.

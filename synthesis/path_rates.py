@@ -11,8 +11,10 @@ within an interval nor a jump is larger than what its time allows:
     \|F_k^+ - F_k^-\| \le R\,t_k, \quad
     t_k(b) = \frac{2 \Delta s_k}{\sqrt{b_k} + \sqrt{b_{k+1}}} .
 
-Jumps vanish with the grid. At an end at rest the forces that hold still, a = b = 0, are those of an
-interval without duration: forces do not step when motion begins, but grow like any others.
+Jumps vanish with the grid, and forces that are linear in time from middle to middle have none. At
+an end at rest the forces that hold still, a = b = 0, are those of an interval without duration:
+forces do not step when motion begins, but grow like any others. The moments that soft fingers
+transmit are not limited.
 
 The time is convex in b, for :math:`\sqrt b` is concave; the limit is not. But a convex function
 lies above its tangents, so that about any pace :math:`b^*` that takes the times :math:`t_k^*`,

@@ -1,7 +1,9 @@
 r"""Solves path problems on Clarabel, to its full accuracy, and proves what it says.
 
 The friction margin is found as in :mod:`synthesis.synthesizer`, by Dinkelbach's method, here with
-the utilisations of all contacts at all stations as its ratios.
+the utilisations of all contacts at all stations as its ratios. A force rate is not convex: its
+problem is solved again and again, with an inner approximation about the last timing that was found,
+see :mod:`synthesis.path_rates`. What comes of it is feasible, and a local optimum.
 """
 
 from __future__ import annotations
@@ -52,7 +54,8 @@ def solve_path(problem: PathProblem) -> PathSolution:
     Raises:
         InfeasiblePathError: No timing and forces satisfy the constraints; says where and which.
         UnboundedError: The objective improves without limit, as with a grip that nothing bounds.
-        SolverError: The solver gave neither, or repeated solves do not settle viscous friction.
+        SolverError: The solver gave neither, or repeated solves do not settle viscous friction or
+            the force rate.
     """
     if problem.force_rate is None or problem.timing is not None or len(problem.s) < 2:
         return _settled(problem)
@@ -77,9 +80,9 @@ def _within_force_rate(problem: PathProblem) -> PathSolution:
 
     The first pace is that of the least time without force rate, or the same motion slower: forces
     tend to those at rest, whose change along the path is finite, and so slow enough keeps any limit
-    where these do not jump. Other objectives than the least time, and a largest duration, come
-    after that: where the least time is too long, the error proves it for forces and motions about
-    the fastest that was found alone, for the problem is not convex.
+    where these do not jump. The error is that about the slowest pace. Other objectives than the
+    least time, and a largest duration, come after that. As the problem is not convex, an error
+    proves that there is no solution about the pace that was tried, not that there is none at all.
     """
     quick = replace(problem, objective=PathObjective.LEAST_TIME, duration=math.inf)
     found = _settled(replace(quick, force_rate=None))
