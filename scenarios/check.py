@@ -28,7 +28,7 @@ RESULT, PICTURE = "check.json", "check.png"
 
 @dataclass(frozen=True)
 class Check(Chosen):
-    """Check a scenario before anything moves: its file, reach, limits, and forces over the tilt."""
+    """Check a scenario before anything moves: its file, room, reach, limits, and forces."""
 
     controller: str = "robust"
     """Whose margins and grip count: robust, margin, paper or no-feedforward."""
@@ -55,6 +55,8 @@ class Check(Chosen):
         found = feasibility(chosen, control)
         console = Console(highlight=False)
         _print(console, chosen, self.controller, found)
+        for misfit in found.surroundings.misfits:
+            console.print(misfit.text, soft_wrap=True, markup=False)
         if found.explanation is not None:
             print_explanation(console, found.explanation, self.controller)
         if found.unreachable is not None:
@@ -87,7 +89,16 @@ def _print(console: Console, scenario: Scenario, controller: str, found: Feasibi
     curves, tilts = found.curves, found.curves.tilts_deg
     table = Table("question", "answer", "at", box=SIMPLE)
     contacts = f"{len(scenario.hands)} hands, {len(scenario.supports)} supports"
-    table.add_row("contacts on the surface", "yes", contacts)
+    around = found.surroundings
+    for question, misfit, where in (
+        ("contacts on the surface", around.supports, contacts),
+        ("room for the object", around.room, ""),
+        ("stands before and after", around.stand, ""),
+    ):
+        if misfit is None:
+            table.add_row(question, "yes", where)
+        else:
+            table.add_row(question, "[red]no[/]: see below", f"{misfit.tilt_deg:.1f} deg")
     if found.unreachable is None:
         joint = min(found.clearances, key=lambda name: found.clearances[name])
         table.add_row("reach, speeds, collisions", "yes", "")
@@ -135,6 +146,7 @@ def _content(found: Feasibility) -> dict[str, Any]:
     return {
         "feasible": found.feasible,
         "unreachable": unreachable,
+        "misfits": [misfit.text for misfit in found.surroundings.misfits],
         "clearances": found.clearances,
         "curves": curves,
         "explanation": None if why is None else dataclasses.asdict(why),

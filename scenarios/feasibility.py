@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from scenarios.surroundings import Surroundings, surroundings
 from sim.explain import Explanation, explain
 from sim.grip import GripSchedule
 from sim.ik import JointPath, PathError, plan_joints
@@ -72,6 +73,7 @@ class Feasibility:
         curves: Forces over the tilt; without joints where the arms cannot follow.
         grip: The least grip over the tilt, if the controller asks for one.
         explanation: Why there are no forces, at the first tilt where there are none.
+        surroundings: Whether the object fits what it stands on and what is in its way.
     """
 
     unreachable: PathError | None
@@ -80,11 +82,13 @@ class Feasibility:
     curves: Curves
     grip: GripSchedule | None
     explanation: Explanation | None
+    surroundings: Surroundings
 
     @property
     def feasible(self) -> bool:
-        """Whether arms and forces can do it."""
-        return self.unreachable is None and self.curves.holds
+        """Whether arms and forces can do it, and surfaces leave room and bear the object."""
+        fits = not self.surroundings.misfits
+        return fits and self.unreachable is None and self.curves.holds
 
 
 def feasibility(scenario: Scenario, control: Control) -> Feasibility:
@@ -116,7 +120,8 @@ def feasibility(scenario: Scenario, control: Control) -> Feasibility:
     curves = _curves(scenario, control, tilts, found, synthesizer)
     missing = [tilt for tilt, (_, s) in zip(tilts.tolist(), found, strict=True) if s is None]
     why = explain(problems, missing[0], synthesizer) if missing else None
-    return Feasibility(unreachable, slower, clearances, curves, grip, why)
+    around = surroundings(scenario)
+    return Feasibility(unreachable, slower, clearances, curves, grip, why, around)
 
 
 def _slower(scenario: Scenario, error: PathError) -> float | None:

@@ -1,12 +1,12 @@
-r"""Where to stand and where to hold: placements sought by CMA-ES over what the synthesis says.
+"""Where to stand and where to hold: placements sought by differential evolution of the synthesis.
 
 Robot base, contact places, turns of the hands and start posture are numbers x in a unit cube
 (:mod:`sim.placement_freedom`); what a placement is worth at a few tilts is one number to be
-minimised (:mod:`sim.placement_value`). A Sobol sample of the cube finds where to begin, CMA-ES goes
-on from its best. The best few are then looked at over the full joint path and run in closed loop;
-the first that stands both and costs less than the placement given wins.
+minimised (:mod:`sim.placement_value`). Differential evolution begins with a Sobol sample of the
+cube. The best few are then looked at over the full joint path and run in closed loop; the first
+that stands both and costs less than the placement given wins.
 
-Source: Hansen, The CMA Evolution Strategy: A Tutorial, arXiv 1604.00772.
+Source: Storn and Price, Differential Evolution, Journal of Global Optimization 11, 1997.
 """
 
 from __future__ import annotations
@@ -19,8 +19,8 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 
-import cma
 import numpy as np
+from scipy.optimize import differential_evolution
 from scipy.stats import qmc
 
 from sim.checks import positive, whole
@@ -36,13 +36,9 @@ from sim.sweep.farm import Workers, cluster
 from synthesis import FulcrumError, InvalidInputError
 from synthesis.contact import Array
 
-# Sizes of the first sample, at most, and of CMA-ES's: even shares for 1, 2 and 4 processes.
-_SAMPLE, _POPULATION = 64, 16
-# CMA-ES wants two numbers at least; one that nothing depends on helps out.
-_NUMBERS = 2
-# First standard deviation of CMA-ES in the unit cube: a quarter of every range.
-_SPREAD = 0.25
-# CMA-ES ends when the costs of its samples lie as near together as this.
+# Placements of a generation, at most and at least: even shares for 1, 2 and 4 processes.
+_POPULATION, _LEAST = 32, 8
+# The search ends when the costs of a generation lie as near together as this.
 _ALIKE = 1e-5
 # Candidates looked at in full, and how far apart they are, at least, in some number [-].
 _FINALISTS, _APART = 4, 0.01
@@ -64,7 +60,7 @@ class Effort:
     The same seed gives the same placement, unless the time ends before the evaluations.
 
     Attributes:
-        evaluations: Placements that are looked at, at most.
+        evaluations: Placements that are looked at, at most; at least 8.
         seconds: Time for everything [s].
         seed: Draws the samples.
         workers: Processes; 1 is the present one.
@@ -76,7 +72,7 @@ class Effort:
     workers: int = 2
 
     def __post_init__(self) -> None:
-        whole("effort.evaluations", self.evaluations, least=1)
+        whole("effort.evaluations", self.evaluations, least=_LEAST)
         whole("effort.seed", self.seed, least=0)
         whole("effort.workers", self.workers, least=1)
         positive("effort.seconds", self.seconds)
@@ -192,10 +188,7 @@ class _Sampler:
     """Asks for placements in batches, and keeps what they cost."""
 
     def __init__(self, start: Array, effort: Effort, deadline: float) -> None:
-        self._effort, self._deadline = effort, deadline
-        self._used = len(start)
-        self._start = np.append(start, np.full(max(0, _NUMBERS - len(start)), 0.5))
-        self._rng = np.random.default_rng(effort.seed)
+        self._start, self._effort, self._deadline = start, effort, deadline
         self._tried: list[tuple[float, Array]] = []
         self.history: list[tuple[int, float]] = []
         self.in_time = True
@@ -207,30 +200,31 @@ class _Sampler:
 
     def run(self, costs: Callable[[list[Array]], list[float]], report: Progress) -> None:
         """Searches until the evaluations or the time are used up, or nothing changes any more."""
+        rng = np.random.default_rng(self._effort.seed)
         # A Sobol sample is even if its size is a power of two.
-        size = min(_SAMPLE, 2 ** int(math.log2(max(2, self._effort.evaluations // 2))))
-        first = qmc.Sobol(len(self._start), rng=self._rng).random(size)
-        self._take([self._start, *first[1:]], costs, report)
-        strategy = cma.CMAEvolutionStrategy(
-            min(self._tried, key=lambda tried: tried[0])[1],
-            _SPREAD,
-            {
-                "bounds": [0.0, 1.0],
-                "popsize": _POPULATION,
-                "tolfun": _ALIKE,
-                "randn": lambda *size: self._rng.standard_normal(size),
-                "seed": math.nan,  # the numbers come from our own generator
-                "verbose": -9,
-            },
+        size = min(_POPULATION, 2 ** int(math.log2(self._effort.evaluations)))
+        first = qmc.Sobol(len(self._start), rng=rng).random(size)
+        first[0] = self._start
+        differential_evolution(
+            lambda batch: self._take(list(batch.T.copy()), costs, report),
+            [(0.0, 1.0)] * len(self._start),
+            init=first,
+            maxiter=self._effort.evaluations // size - 1,
+            tol=0.0,
+            atol=_ALIKE,
+            polish=False,
+            rng=rng,
+            updating="deferred",
+            vectorized=True,
+            callback=lambda x, convergence: not self.in_time,
         )
-        while self.done < self._effort.evaluations and self.in_time and not strategy.stop():
-            batch = strategy.ask()
-            strategy.tell(batch, self._take(batch, costs, report))
 
     def _take(
         self, batch: list[Array], costs: Callable[[list[Array]], list[float]], report: Progress
     ) -> list[float]:
-        found = costs([x[: self._used] for x in batch])
+        if not self.in_time:  # the first sample has used it up
+            return [math.inf] * len(batch)
+        found = costs(batch)
         self._tried += zip(found, batch, strict=True)
         least = min(cost for cost, _ in self._tried)
         self.history.append((self.done, least))
@@ -242,8 +236,7 @@ class _Sampler:
     def best(self) -> list[Array]:
         """The placements that cost least, no two alike."""
         found: list[Array] = []
-        for _, tried in sorted(self._tried, key=lambda tried: tried[0]):
-            x = tried[: self._used]
+        for _, x in sorted(self._tried, key=lambda tried: tried[0]):
             if all(np.abs(x - other).max() > _APART for other in found):
                 found.append(x)
             if len(found) == _FINALISTS:

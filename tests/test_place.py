@@ -25,7 +25,7 @@ phases = [
     { name = "hold", duration_s = 0.1, tilt = 1.0, gap_m = 0.0, grip = 1.0 },
 ]
 """
-QUICK = ["--evaluations", "6", "--workers", "1"]
+QUICK = ["--evaluations", "8", "--workers", "1"]
 QUICK += [word for kept in ("hands", "turn", "posture") for word in ("--keep", kept)]
 
 

@@ -204,6 +204,14 @@ def test_the_sampler_finds_the_bottom_of_a_bowl(numbers):
     assert best == pytest.approx(0.3, abs=0.01)
 
 
+def test_a_search_whose_time_is_up_looks_at_no_more_than_the_first_sample():
+    sampler = _Sampler(np.full(3, 0.9), Effort(160, 60.0, 0, workers=1), deadline=-np.inf)
+    sampler.run(bowl, lambda done, total, note: None)
+    # One sample of 32; with time left there are five.
+    assert (sampler.done, sampler.in_time) == (32, False)
+    assert (sampled(0).done, sampled(0).in_time) == (160, True)
+
+
 # That a search improves, and what confirms it, is in tests/test_place.py.
 def test_a_claim_that_is_not_so_would_be_caught():
     value = worth(SCENE)
@@ -218,6 +226,8 @@ def test_an_unknown_controller_or_effort_is_refused():
         search(SCENE, "best")
     with pytest.raises(InvalidInputError, match=r"effort\.workers"):
         Effort(workers=0)
+    with pytest.raises(InvalidInputError, match=r"effort\.evaluations"):
+        Effort(evaluations=7)
 
 
 def test_a_robust_controller_counts_with_the_worst_of_its_set():
