@@ -10,12 +10,11 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from sim.contacts import contact_axes
-from sim.path import rotation
 from sim.placement_face import Range, faces_of, moved, shape_of
 from sim.placement_mirror import chains, find_mirror
+from sim.pose import triple, wxyz
 from sim.scenario import Hand, Pose, Robot, Scenario
 from sim.scene import compose
-from sim.shape import triple
 from synthesis import InvalidInputError
 from synthesis.contact import Array
 
@@ -238,5 +237,4 @@ def _based(robot: Robot, scenario: Scenario, values: dict[str, float]) -> Robot:
         return replace(robot, base=Pose(position, base.quaternion))
     turn = Rotation.from_rotvec([0.0, 0.0, math.radians(degrees)])
     position = triple(point + turn.apply(np.asarray(base.position) - point) + moves)
-    w, x, y, z = (turn * rotation(base)).as_quat(scalar_first=True).tolist()
-    return replace(robot, base=Pose(position, (w, x, y, z)))
+    return replace(robot, base=Pose(position, wxyz(turn * base.rotation)))
