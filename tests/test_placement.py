@@ -181,10 +181,9 @@ def bowl(batch):
     return [float(np.square(x - 0.3).sum()) for x in batch]
 
 
-def sampled(seed, evaluations=160, numbers=3, seconds=60.0):
-    effort = Effort(evaluations, seconds, seed, workers=1)
-    sampler = _Sampler(np.full(numbers, 0.9), effort, seconds)
-    sampler._deadline = np.inf
+def sampled(seed, evaluations=160, numbers=3):
+    effort = Effort(evaluations, seed=seed, workers=1)
+    sampler = _Sampler(np.full(numbers, 0.9), effort, deadline=np.inf)
     sampler.run(bowl, lambda done, total, note: None)
     return sampler
 
