@@ -96,7 +96,7 @@ class Moves:
         allowed = dict.fromkeys(names, ()) if freedom.faces is None else freedom.faces
         for name in allowed:
             if name not in names:
-                raise InvalidInputError("freedom.faces", name, f"of {', '.join(names)}")
+                raise InvalidInputError("freedom.faces", name, f"one of {', '.join(names)}")
         followers = () if self.mirror is None else (self.mirror.hands[1].name,)
         self._leaders = [hand for hand in scenario.hands if hand.name not in followers]
         self._faces = {
@@ -118,7 +118,8 @@ class Moves:
         ]
         variables = [v for v in variables if v.high > v.low]
         if not variables:
-            raise InvalidInputError("freedom", freedom, "one with something that may move")
+            valid = "one with something that may move"
+            raise InvalidInputError("freedom", "one in which all stays", valid)
         self.names = tuple(v.name for v in variables)
         self._low = np.array([v.low for v in variables])
         self._high = np.array([v.high for v in variables])

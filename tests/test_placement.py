@@ -116,7 +116,7 @@ def test_a_hand_may_go_to_another_face_if_it_is_allowed():
         ({"x": (0.1, 0.2)}, "freedom.x: got .* contains 0"),
         ({"turn_deg": (float("nan"), 0.0)}, "freedom.turn_deg"),
         ({"border": -0.01}, "freedom.border"),
-        ({"faces": {"middle": ()}}, "of left, right"),
+        ({"faces": {"middle": ()}}, "one of left, right"),
         ({"faces": {"left": ("top",)}}, r"one of \+x, -x"),
     ],
 )
