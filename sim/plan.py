@@ -8,7 +8,7 @@ from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
-from scipy.interpolate import BSpline
+from scipy.interpolate import BSpline, make_interp_spline
 
 from sim.checks import positive
 from sim.plan_problem import CERTAIN, Margins, path_problem
@@ -19,6 +19,7 @@ from synthesis.errors import InfeasiblePathError
 from synthesis.path_loads import solve_many
 from synthesis.path_problem import PathObjective, PathProblem
 from synthesis.path_solution import PathSolution
+from synthesis.rows import Indices
 from synthesis.uncertainty_set import UncertaintySet
 
 # What the solver's accuracy may add to a limit that a plan uses up, as a share of it [-].
@@ -113,7 +114,9 @@ class Plan:
     def at(self, t: float) -> Moment:
         """The plan at a time [s]; before its start and after its end at rest there.
 
-        The timing is exact; forces and torques are linear in the tilt between grid points.
+        The timing is exact; forces and torques are linear in the tilt between grid points, where
+        they jump. With a force rate they and the acceleration are linear in time between the
+        middles of intervals, and continuous.
         """
         found = self.solution
         s = found.problem.s
@@ -124,8 +127,10 @@ class Plan:
         share = s[k] + elapsed * (start + a * elapsed / 2.0)
         rate = (start + a * elapsed) if moving else 0.0
         a = a if moving else 0.0
+        if self._smooth is not None and moving:
+            a = float(self._smooth[2](np.clip(t, self._smooth[2].t[0], self._smooth[2].t[-1])))
         part = float(np.clip((share - s[k]) / (s[k + 1] - s[k]), 0.0, 1.0))
-        w, tau = found.w_OC_C[0][2 * k : 2 * k + 2], found.tau[0][2 * k : 2 * k + 2]
+        w, tau = self._between(np.array([k]), np.array([part]), np.array([t]))
         end = math.radians(self.scenario.path.angle_deg)
         slope, curvature = self.q(share, 1), self.q(share, 2)
         return Moment(
@@ -135,12 +140,41 @@ class Plan:
             q=self.q(share),
             qd=slope * rate,
             qdd=slope * a + curvature * rate**2,
-            w_OC_C=w[0] + part * (w[1] - w[0]),
-            tau=tau[0] + part * (tau[1] - tau[0]),
+            w_OC_C=w[0],
+            tau=tau[0],
         )
 
+    def _between(self, k: Indices, part: Array, t: Array) -> tuple[Array, Array]:
+        """Wrenches, (n, m, 6), and torques, (n, l), that far in intervals k, at times t [s]."""
+        w, tau = self.solution.w_OC_C[0], self.solution.tau[0]
+        if self._smooth is not None:
+            t = np.clip(t, self._smooth[0].t[0], self._smooth[0].t[-1])
+            return self._smooth[0](t), self._smooth[1](t)
+        first, second = 2 * k, 2 * k + 1
+        w = w[first] + part[:, None, None] * (w[second] - w[first])
+        return w, tau[first] + part[:, None] * (tau[second] - tau[first])
+
+    @cached_property
+    def _smooth(self) -> tuple[BSpline, ...] | None:
+        """Wrenches, torques and acceleration over time where the force rate is limited.
+
+        The means of intervals, in their middles, and what holds still at rest: the limit is theirs.
+        """
+        found, times = self.solution, self.times
+        if found.problem.force_rate is None:
+            return None
+        ends = 2 * len(times) - 2
+        middles = (times[:-1] + times[1:]) / 2.0
+        knots = np.append(middles, times[list(found.problem.rests)])
+        order = np.argsort(knots)
+        means = (
+            np.concatenate([(each[:ends:2] + each[1:ends:2]) / 2.0, each[ends:]])[order]
+            for each in (found.w_OC_C[0], found.tau[0], found.motion[0])
+        )
+        return tuple(make_interp_spline(knots[order], mean, k=1) for mean in means)
+
     def along(self, tilts: Array) -> Along:
-        """The plan over the tilt instead of time, linear between the ends of each interval.
+        """The plan over the tilt instead of time, with forces and torques as in :meth:`at`.
 
         Args:
             tilts: [rad], (k,); beyond its ends the plan's at those.
@@ -149,14 +183,11 @@ class Plan:
         share = np.clip(tilts / math.radians(self.scenario.path.angle_deg), s[0], s[-1])
         k = np.clip(np.searchsorted(s, share, side="right") - 1, 0, len(s) - 2)
         part = (share - s[k]) / (s[k + 1] - s[k])
-        w, tau = found.w_OC_C[0], found.tau[0]
         squared = found.b[k] + part * (found.b[k + 1] - found.b[k])
-        first, second = 2 * k, 2 * k + 1
-        return Along(
-            rate=np.sqrt(np.maximum(squared, 0.0)) * math.radians(self.scenario.path.angle_deg),
-            w_OC_C=w[first] + part[:, None, None] * (w[second] - w[first]),
-            tau=tau[first] + part[:, None] * (tau[second] - tau[first]),
-        )
+        rate = np.sqrt(np.maximum(squared, 0.0))
+        mean = np.maximum(rate + np.sqrt(found.b[k]), np.finfo(float).tiny) / 2.0
+        w, tau = self._between(k, part, self.times[k] + (share - s[k]) / mean)
+        return Along(rate * math.radians(self.scenario.path.angle_deg), w, tau)
 
     def stretched(self, factor: float) -> Plan:
         """The same motion in ``factor`` times the duration, with forces of its own.

@@ -21,10 +21,10 @@ _NAMED = 6
 def draw(plan: Plan, file: Path) -> None:
     """Writes the picture as PNG."""
     found = plan.solution
-    t = plan.times[found.problem.stations[:, 0]]
+    t = plan.times[found.problem.stations[: 2 * len(plan.times) - 2, 0]]
     canvas, axes = plt.subplots(5, 1, figsize=(9, 13), sharex=True, layout="constrained")
     _motion(plan, axes[0])
-    forces = found.w_OC_C[0][:, :, N]
+    forces = found.w_OC_C[0][: len(t), :, N]
     contacts = [contact.name for contact in found.problem.loads[0].problems[0].contacts]
     for name, curve in zip(contacts, forces.T, strict=True):
         axes[1].plot(t, curve, label=name, lw=1.5)
@@ -60,6 +60,6 @@ def _shares(axes: Axes, t: Array, shares: dict[str, Array], kind: str, label: st
     for name in sorted(own, key=lambda name: -own[name].max()):
         rank = [line.get_label() for line in axes.get_lines()]
         shown = name.removeprefix(kind) if len(rank) < _NAMED else None
-        axes.plot(t, 100.0 * own[name], label=shown, lw=1.3, alpha=1.0 if shown else 0.3)
+        axes.plot(t, 100.0 * own[name][: len(t)], label=shown, lw=1.3, alpha=1.0 if shown else 0.3)
     axes.axhline(100.0, color="k", lw=0.8, ls="--")
     axes.set_ylabel(label)

@@ -20,10 +20,10 @@ bounds                      of normal forces and torques, of every station and l
 rates                       :math:`b_k \le b_{max,k}`
 duration                    :math:`\sum t_k \le T`
 first margin                :math:`\lambda \le 0` (friction margin, first solve only)
-cones                       friction; :math:`c_k`; :math:`t_k`; accelerations
+cones                       friction; :math:`c_k`; :math:`t_k`; accelerations; force rates
 ==========================  =========================================================
 
-Forces are in units of the largest load, times in units of :meth:`PathProblem.timescale`.
+Forces are in units of the largest load, times of :meth:`PathProblem.timescale` or of the pace.
 """
 
 from __future__ import annotations
@@ -37,8 +37,9 @@ import scipy.sparse as sp
 
 from synthesis.conic import ConicForm
 from synthesis.contact import Array, Mask
-from synthesis.path_cones import timing_cones
+from synthesis.path_cones import timing_cones, timing_units
 from synthesis.path_problem import Load, PathObjective, PathProblem
+from synthesis.path_rates import RateCones, durations
 from synthesis.problem import Objective, Problem
 from synthesis.rows import Indices, Rows
 
@@ -69,6 +70,7 @@ class PathForm:
         reference: Array | None = None,
         grip: Array | None = None,
         where: Mask | None = None,
+        pace: Array | None = None,
     ) -> None:
         """Assembles the matrices.
 
@@ -78,11 +80,14 @@ class PathForm:
             grip: Normal forces of the n hands [N], (S, n), where they are given.
             where: Which stations count, (S,), where the timing is given; all if left out. S is
                 their number from here on.
+            pace: b [1/s^2], (K,), about which the force rate is limited, without a timing.
         """
         self.problem, self._reference, self._grip = problem, reference, grip
         self.rows = Rows()
         self.unit = max(p.load for load in problem.loads for p in load.problems) or 1.0
-        self._time = problem.timescale()
+        self._pace = pace if problem.timing is None else problem.timing
+        self._time = problem.timescale() if pace is None else durations(problem.s, pace).sum()
+        self._rate = None if pace is None else np.sqrt(pace) * self._time
         self._margin = problem.objective is PathObjective.FRICTION_MARGIN
         self._effort = problem.objective is PathObjective.LEAST_EFFORT
         self._points, self._ds = len(problem.s), np.diff(problem.s)
@@ -135,6 +140,7 @@ class PathForm:
         if self._points == 1:
             return
         slope = per_a / (2.0 * self._ds[self._interval, None] * self._time**2)
+        slope[self._interval < 0] = 0.0
         self.rows.add(slope, rows, self._b[self._interval + 1][:, None])
         self.rows.add(-slope, rows, self._b[self._interval][:, None])
         self.rows.add(per_b / self._time**2, rows, self._b[self._point][:, None])
@@ -222,22 +228,26 @@ class PathForm:
 
     def _second_order_cones(self) -> None:
         self._heads: list[Indices] = []
+        s = self.problem.s[self._point]
         for load, form, A, b, columns in self._blocks:
             contacts, heads = load.problems[0].contacts, []
             start = form.cone_rows.start
             for i, width in form.cones:
                 own = slice(start, start + width)
                 start += width
-                h = b[self._point][:, own]
                 names = [f"friction of {contacts[i].name}"] * width
-                rows = self.rows.new(h, self.problem.s[self._point], names)
+                rows = self.rows.new(b[self._point][:, own], s, names)
                 self.rows.add_block(A[self._point][:, own], rows, columns)
                 self.rows.second_order(rows)
                 heads.append(rows[:, 0])
             self._heads.append(np.stack(heads, axis=1) if heads else np.zeros((0, 0), np.intp))
         if self._timed:
-            timing_cones(self.rows, self.problem.s, self._b, self._c, self._t)
+            timing_cones(self.rows, self.problem.s, self._b, self._c, self._t, self._rate)
             self._acceleration_cones()
+        if self._pace is not None and self.problem.force_rate is not None:
+            cones = RateCones(self.rows, self.problem, self._pace, self._time)
+            for block in self._blocks:
+                cones.add(block.load, block.columns, self._b, self.unit)
 
     def _acceleration_cones(self) -> None:
         limited, point = self.problem.accelerations, self._point
@@ -247,9 +257,8 @@ class PathForm:
             h = np.tile([1.0, 0.0, 0.0, 0.0], (len(point), 1))
             names = [f"acceleration of {limited.names[j]}"] * 4
             rows = self.rows.new(h, self.problem.s[point], names)
-            slopes, curvatures = limited.slopes[point, j], limited.curvatures[point, j]
-            limit = limited.limits[j]
-            self._add_motion(rows[:, 1:], slopes / limit, curvatures / limit)
+            vectors = limited.slopes[point, j], limited.curvatures[point, j]
+            self._add_motion(rows[:, 1:], *(each / limited.limits[j] for each in vectors))
             self.rows.second_order(rows)
 
     def _finish(self) -> None:
@@ -258,39 +267,38 @@ class PathForm:
         problem = self.problem
         b, fixed = np.zeros(self._points), np.zeros(self._columns, bool)
         if self._timed:
-            b[[0, -1]] = problem.start_rate**2, problem.end_rate**2
             ends = [0, -1]
+            b[ends] = problem.start_rate**2, problem.end_rate**2
             fixed[self._b[ends]] = fixed[self._c[ends]] = True
         else:
             b = b if problem.timing is None else problem.timing
             fixed[: self._t.size + 2 * self._points] = True
         self._constant = np.zeros(self._columns)
-        self._constant[self._b], self._constant[self._c] = (
-            b * self._time**2,
-            np.sqrt(b) * self._time,
-        )
+        self._constant[self._b] = b * self._time**2
+        self._constant[self._c] = np.sqrt(b) * self._time
         if self._grip is not None:
             _, form, _, _, columns = self._blocks[0]
             hands = columns[:, form.hand_normals]
             fixed[hands], self._constant[hands] = True, self._grip / self.unit
         self._free = np.flatnonzero(~fixed)
         self._h = h - whole @ self._constant
-        self._A = whole[:, self._free]
+        self._scale = timing_units(problem.s, self._rate, self._columns)[self._free]
+        self._A = whole[:, self._free] @ sp.diags_array(self._scale)
         q, P = np.zeros(self._columns), np.zeros(self._columns)
-        least_time = problem.objective is PathObjective.LEAST_TIME
-        q[self._t] = float(least_time)
+        q[self._t] = float(problem.objective is PathObjective.LEAST_TIME)
         if self._margin:
             q[self._aux] = 1.0
         if self._effort:
             P[self._u] = 2.0 * self._weights()[:, None]
-        self.q = q[self._free]
+        self.q = q[self._free] * self._scale
         self.P = sp.diags_array(P[self._free]).tocsc()
 
     def _weights(self) -> Array:
         """Share of each station in the mean over path and loads, (S,)."""
         share = np.ones(1)
         if self._points > 1:
-            share = np.repeat(self._ds / self._ds.sum() / 2.0, 2)
+            share = np.zeros(len(self._point))
+            share[: 2 * len(self._ds)] = np.repeat(self._ds / self._ds.sum() / 2.0, 2)
         return share / len(self._blocks)
 
     def matrices(self, utilisation: float, slack: list[Array] | None) -> tuple[Any, Array]:
@@ -317,7 +325,7 @@ class PathForm:
     def completed(self, x: Array) -> Array:
         """All variables of those that the solver found."""
         every = self._constant.copy()
-        every[self._free] = x
+        every[self._free] = x * self._scale
         return every
 
     def squared_rates(self, every: Array) -> Array:

@@ -15,6 +15,7 @@ import numpy as np
 
 from synthesis.contact import Array, ContactModel
 from synthesis.errors import InvalidInputError
+from synthesis.path_limits import Accelerations, Rates, check_array
 from synthesis.problem import Problem
 from synthesis.rows import Indices
 
@@ -30,55 +31,6 @@ class PathObjective(StrEnum):
     def needs_duration(self) -> bool:
         """Whether only a largest duration makes the answer finite and useful."""
         return self is not PathObjective.LEAST_TIME
-
-
-@dataclass(frozen=True, eq=False)
-class Rates:
-    r"""Speeds that are limited: :math:`|x'(s)|\,\dot s \le x_{max}`.
-
-    Attributes:
-        names: The r speeds.
-        slopes: Derivatives by s of what moves [unit per s], (K, r).
-        limits: [unit/s], (r,), > 0; may be infinite.
-    """
-
-    names: tuple[str, ...]
-    slopes: Array
-    limits: Array
-
-    def __post_init__(self) -> None:
-        _check("rates.slopes", self.slopes, (len(self.slopes), len(self.names)))
-        _check_limits("rates.limits", self.limits, len(self.names))
-
-    def largest(self) -> tuple[Array, list[str]]:
-        """The largest b at each grid point, (K,), and which speed it is that limits it."""
-        with np.errstate(divide="ignore"):
-            each = (self.limits / np.abs(self.slopes)) ** 2
-        worst = each.argmin(axis=1)
-        return each.min(axis=1), [self.names[j] for j in worst]
-
-
-@dataclass(frozen=True, eq=False)
-class Accelerations:
-    r"""Accelerations that are limited: :math:`\|x'(s)\,a + x''(s)\,b\| \le x_{max}`.
-
-    Attributes:
-        names: The r points that accelerate.
-        slopes: First derivatives of their positions by s [m per s], (K, r, 3).
-        curvatures: Second derivatives, (K, r, 3).
-        limits: [m/s^2], (r,), > 0; may be infinite.
-    """
-
-    names: tuple[str, ...]
-    slopes: Array
-    curvatures: Array
-    limits: Array
-
-    def __post_init__(self) -> None:
-        shape = (len(self.slopes), len(self.names), 3)
-        _check("accelerations.slopes", self.slopes, shape)
-        _check("accelerations.curvatures", self.curvatures, shape)
-        _check_limits("accelerations.limits", self.limits, len(self.names))
 
 
 @dataclass(frozen=True, eq=False)
@@ -98,7 +50,7 @@ class InertialTorques:
 
     def __post_init__(self) -> None:
         for name in ("tau_a", "tau_b", "tau_c"):
-            _check(f"inertial_torques.{name}", getattr(self, name), np.shape(self.tau_a))
+            check_array(f"inertial_torques.{name}", getattr(self, name), np.shape(self.tau_a))
 
 
 @dataclass(frozen=True, eq=False)
@@ -122,8 +74,8 @@ class Load:
         points = len(self.problems)
         if not points:
             raise InvalidInputError("load.problems", "none", "one for every grid point")
-        _check("load.w_a_O", self.w_a_O, (points, 6))
-        _check("load.w_b_O", self.w_b_O, (points, 6))
+        check_array("load.w_a_O", self.w_a_O, (points, 6))
+        check_array("load.w_b_O", self.w_b_O, (points, 6))
         first = self.problems[0]
         for k, problem in enumerate(self.problems):
             same = problem.contacts == first.contacts
@@ -150,6 +102,7 @@ class PathProblem:
                                & \text{(16), (7), (5), (6) of the paper} \\
                                & |x_r'| \sqrt b \le x_{r,max}, \quad
                                  \|x_q' a + x_q'' b\| \le x_{q,max} \\
+                               & \|d f_i / d t\| \le R \text{ for every contact force } f_i \\
                                & \textstyle\int ds / \sqrt b \le T
 
     at both ends of every interval of the grid, each with that interval's a: accelerations, and with
@@ -157,6 +110,9 @@ class PathProblem:
 
     Several loads are an uncertain object: a and b and the normal forces of the hands serve all of
     them, while friction and the environment's forces are each load's own.
+
+    With a force rate, which alone is not convex, see :mod:`synthesis.path_rates`, motion from or to
+    rest has a station more there, a = b = 0, for forces begin and end with those that hold.
 
     Objectives: the duration; the mean over the path of the sum of squared torque utilisations
     :math:`2\tau / (\tau_{max} - \tau_{min})`; the largest friction utilisation.
@@ -167,6 +123,8 @@ class PathProblem:
         inertial_torques: Of the robot; None without joints.
         rates: Speed limits.
         accelerations: Acceleration limits.
+        force_rate: Largest rate R of every contact force, the vector in contact axes [N/s]; None
+            without limit.
         objective: Phi.
         duration: Largest duration T [s]; may be infinite.
         start_rate, end_rate: :math:`\dot s` at both ends [1/s].
@@ -182,6 +140,7 @@ class PathProblem:
     inertial_torques: InertialTorques | None = None
     rates: Rates | None = None
     accelerations: Accelerations | None = None
+    force_rate: float | None = None
     objective: PathObjective = PathObjective.LEAST_TIME
     duration: float = math.inf
     start_rate: float = 0.0
@@ -190,7 +149,7 @@ class PathProblem:
 
     def __post_init__(self) -> None:
         points = len(self.s)
-        _check("s", self.s, (points,))
+        check_array("s", self.s, (points,))
         if not points or (np.diff(self.s) <= 0.0).any():
             raise InvalidInputError("s", "numbers that do not increase", "an increasing grid")
         if not self.loads:
@@ -202,7 +161,7 @@ class PathProblem:
             self._check_alike(i, load.problems[0])
         self._check_torques(points)
         if self.rates is not None:
-            _check("rates.slopes", self.rates.slopes, (points, len(self.rates.names)))
+            check_array("rates.slopes", self.rates.slopes, (points, len(self.rates.names)))
         if self.accelerations is not None and len(self.accelerations.slopes) != points:
             given = f"{len(self.accelerations.slopes)} points"
             raise InvalidInputError("accelerations.slopes", given, f"{points} points")
@@ -210,10 +169,12 @@ class PathProblem:
             value = getattr(self, name)
             if not (math.isfinite(value) and value >= 0.0):
                 raise InvalidInputError(name, value, "a finite rate >= 0 1/s")
+        if self.force_rate is not None and not 0.0 < self.force_rate < math.inf:
+            raise InvalidInputError("force_rate", self.force_rate, "a finite rate > 0 N/s, or None")
         if not self.duration > 0.0:
             raise InvalidInputError("duration", self.duration, "a time > 0 s")
         if self.timing is not None:
-            _check("timing", self.timing, (points,))
+            check_array("timing", self.timing, (points,))
             if (self.timing[1:-1] <= 0.0).any() or (self.timing < 0.0).any():
                 raise InvalidInputError("timing", "rests on the way", "positive between the ends")
             if self.objective is PathObjective.LEAST_TIME:
@@ -247,7 +208,9 @@ class PathProblem:
             return
         if self.inertial_torques is None:
             raise InvalidInputError("inertial_torques", None, "torques, as there are joints")
-        _check("inertial_torques.tau_a", self.inertial_torques.tau_a, (points, len(joints.names)))
+        check_array(
+            "inertial_torques.tau_a", self.inertial_torques.tau_a, (points, len(joints.names))
+        )
         if self.objective is PathObjective.LEAST_EFFORT:
             usable = np.isfinite(joints.tau_min) & np.isfinite(joints.tau_max)
             usable &= joints.tau_min < joints.tau_max
@@ -285,13 +248,24 @@ class PathProblem:
     def stations(self) -> Array:
         """Grid point and interval of every place where the constraints hold, (S, 2) integers.
 
-        With a single grid point the only station has the interval -1.
+        Both ends of every interval in order, then rests, whose interval is -1. With a single grid
+        point there is but a rest.
         """
         intervals = np.arange(len(self.s) - 1)
         if not len(intervals):
             return np.array([[0, -1]])
         both = [[intervals, intervals], [intervals + 1, intervals]]
-        return np.array(both).transpose(2, 0, 1).reshape(-1, 2)
+        found = np.array(both).transpose(2, 0, 1).reshape(-1, 2)
+        return np.array([*found, *([point, -1] for point in self.rests)])
+
+    @property
+    def rests(self) -> tuple[int, ...]:
+        """Grid points at rest that are stations of their own: ends, with a force rate."""
+        if self.force_rate is None or len(self.s) < 2:
+            return ()
+        rates = (self.start_rate, self.end_rate) if self.timing is None else self.timing[[0, -1]]
+        ends = (0, len(self.s) - 1)
+        return tuple(end for end, rate in zip(ends, rates, strict=True) if rate == 0.0)
 
     def moving(self, load: int, point: int, a: float, b: float) -> Problem:
         """(17) at a grid point in motion: what accelerates object and robot counts as load.
@@ -325,15 +299,3 @@ class PathProblem:
         inertia = np.linalg.norm(load.w_a_O, axis=1).max() * (self.s[-1] - self.s[0])
         weight = max(problem.load for problem in load.problems)
         return math.sqrt(inertia / weight) if inertia > 0.0 and weight > 0.0 else 1.0
-
-
-def _check(name: str, array: Array, shape: tuple[int, ...]) -> None:
-    if np.shape(array) != shape:
-        raise InvalidInputError(name, f"shape {np.shape(array)}", f"shape {shape}")
-    if not np.isfinite(array).all():
-        raise InvalidInputError(name, "a value that is NaN or infinite", "finite numbers")
-
-
-def _check_limits(name: str, limits: Array, count: int) -> None:
-    if np.shape(limits) != (count,) or not (np.asarray(limits) > 0.0).all():
-        raise InvalidInputError(name, limits, f"{count} numbers > 0")

@@ -9,6 +9,7 @@ import numpy as np
 
 from synthesis.contact import Array, ContactSet, N, utilisation
 from synthesis.path_problem import PathProblem
+from synthesis.path_rates import force_rate_shares
 
 # From this share of a limit on a constraint counts as active.
 ACTIVE = 0.999
@@ -34,7 +35,7 @@ class PathResiduals:
 class PathSolution:
     """An optimal timing of a path and the forces along it.
 
-    Stations are the ends of the intervals, see :attr:`PathProblem.stations`.
+    Stations are the ends of the intervals, and rests, see :attr:`PathProblem.stations`.
 
     Attributes:
         problem: What was solved.
@@ -76,8 +77,7 @@ class PathSolution:
     def motion(self) -> tuple[Array, Array]:
         """a and b at the stations [1/s^2], (S,) each."""
         point, interval = self.problem.stations.T
-        a = np.zeros(len(point)) if interval[0] < 0 else self.a[interval]
-        return a, self.b[point]
+        return np.append(self.a, 0.0)[interval], self.b[point]
 
     @cached_property
     def tau(self) -> tuple[Array, ...]:
@@ -118,6 +118,13 @@ class PathSolution:
             sizes = np.linalg.norm(vectors, axis=2) / limited.limits
             found |= {
                 f"acceleration of {n}": s for n, s in zip(limited.names, sizes.T, strict=True)
+            }
+        if (limit := self.problem.force_rate) is not None and len(self.b) > 1:
+            each = [force_rate_shares(self.problem, limit, self.b, w) for w in self.w_OC_C]
+            contacts = self.problem.loads[0].problems[0].contacts
+            worst = np.max(each, axis=0)
+            found |= {
+                f"force rate of {contacts[i].name}": worst[:, i] for i in range(len(contacts))
             }
         return found
 

@@ -24,11 +24,14 @@ class Group:
         s: Where on the path, (places,); NaN for what concerns all of it.
         names: Of the r rows at each of the places, or once for all of them; empty for rows that are
             no limits.
+        scale: How large what the rows are scaled by is in units that all rows have in common,
+            (places,), or once for all of them.
     """
 
     rows: Indices
     s: Array
     names: list[list[str]]
+    scale: Array | float = 1.0
 
 
 class Rows:
@@ -49,12 +52,12 @@ class Rows:
         self._nonnegative = slice(0, 0)
         self._second_order: list[Indices] = []
 
-    def new(self, h: Array, s: Array, *names: list[str]) -> Indices:
+    def new(self, h: Array, s: Array, *names: list[str], scale: Array | float = 1.0) -> Indices:
         """Row numbers, (places, r), for right-hand sides of that shape, at places s, (places,)."""
         rows = self._count + np.arange(h.size).reshape(h.shape)
         self._count += h.size
         self._h.append(h.ravel())
-        self.groups.append(Group(rows, s, list(names)))
+        self.groups.append(Group(rows, s, list(names), scale))
         return rows
 
     def add(self, data: Array | float, rows: Indices, columns: Indices) -> None:
@@ -107,8 +110,9 @@ class Rows:
     def weights(self, z: Array) -> Iterator[tuple[float, float, str]]:
         """Size of the multiplier of each row that is a limit's, its place and its name."""
         for group in self.groups:
+            scale = np.broadcast_to(group.scale, group.s.shape)
             for k, (rows, s) in enumerate(zip(group.rows, group.s, strict=True)):
                 names = group.names[k if len(group.names) > 1 else 0]
                 for row, name in zip(rows, names, strict=True):
                     if name:
-                        yield abs(float(z[row])), float(s), name
+                        yield abs(float(z[row] / scale[k])), float(s), name

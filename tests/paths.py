@@ -7,7 +7,8 @@ import math
 import numpy as np
 
 from synthesis import Contact, ContactModel, Joints, Problem, Role
-from synthesis.path_problem import InertialTorques, Load, PathObjective, PathProblem, Rates
+from synthesis.path_limits import Rates
+from synthesis.path_problem import InertialTorques, Load, PathObjective, PathProblem
 from tests.problems import axes
 
 MASS, FORCE, LENGTH = 2.0, 3.0, 1.5

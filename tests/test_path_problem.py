@@ -6,8 +6,8 @@ import pytest
 
 from synthesis import InfeasibleError, InvalidInputError, Objective, Synthesizer
 from synthesis.errors import InfeasiblePathError, UnboundedError
+from synthesis.path_limits import Accelerations
 from synthesis.path_problem import (
-    Accelerations,
     InertialTorques,
     Load,
     PathObjective,

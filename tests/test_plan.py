@@ -217,6 +217,31 @@ def test_soft_hands_take_longer_and_keep_their_limits():
     assert shares["acceleration of left"].max() == pytest.approx(1.0, abs=1e-6)
 
 
+def test_a_limited_force_rate_holds_at_every_instant_and_forces_fit_the_motion():
+    check, rate = InverseDynamics(scenario(BOX)), 30.0
+    worst, steepest = [], []
+    for limit in (rate, None):
+        planned = plan(scenario(BOX), replace(MARGINS[BOX], force_rate=limit), points=41)
+        assert max(lacking(check, moment) for moment in at_stations(planned)) < 1e-9
+        times = np.linspace(0.0, planned.duration, 601)
+        moments = [planned.at(t) for t in times]
+        change = np.diff([moment.w_OC_C[:, :3] for moment in moments], axis=0)
+        steepest.append(np.linalg.norm(change, axis=2).max() / times[1])
+        # The tilt's rounding stands between them.
+        along = planned.along(np.array([moment.tilt for moment in moments[1:-1:50]]))
+        again = np.array([moment.w_OC_C for moment in moments[1:-1:50]])
+        np.testing.assert_allclose(along.w_OC_C, again, atol=1e-6)
+        worst.append(np.median([lacking(check, moment) for moment in moments[1:-1]]))
+    assert steepest[0] < 1.01 * rate < steepest[1] / 10.0
+    # Between grid points both are off by the square of the grid's width: 1 % of a newton.
+    assert max(worst) < 0.02
+
+
+def lacking(check, moment):
+    """By how much forces and torques miss what a motion needs [N, N m]."""
+    return max(float(np.abs(needed - given).max()) for needed, given in check.forces(moment))
+
+
 def test_a_robust_plan_serves_its_set_with_one_grip_and_not_more():
     nominal = scenario(BOX)
     uncertainty = UncertaintySet(mass=0.1, center=(0.01, 0.0, 0.0), friction=0.15)
@@ -296,6 +321,7 @@ def test_the_lift_has_no_plan():
         {"grip_max": 4.0},
         {"tip_speed": 0.0},
         {"tip_acceleration": math.nan},
+        {"force_rate": 0.0},
     ],
 )
 def test_senseless_margins_are_refused_by_name(wrong):
