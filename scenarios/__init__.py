@@ -28,19 +28,13 @@ def scenario(name_or_file: str, allowed: tuple[Path, ...] = ()) -> Scenario:
     Raises:
         InvalidInputError: There is none of that name, or the file is not valid.
     """
-    from scenarios.file import SUFFIX, read
-    from scenarios.file_errors import nearest
+    from scenarios.file import named_file, read
     from scenarios.file_scene import check_scene
 
     known = scenarios()
     if name_or_file in known:
         return known[name_or_file]
-    if not name_or_file.endswith(SUFFIX):
-        from synthesis.errors import InvalidInputError
-
-        valid = f"{nearest(name_or_file, list(known))}, or a file ending in {SUFFIX}"
-        raise InvalidInputError("scenario", repr(name_or_file), valid)
-    file = Path(name_or_file)
+    file = named_file("scenario", name_or_file)
     found = read(file, allowed)
     check_scene(file, found)
     return found

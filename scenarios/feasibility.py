@@ -15,6 +15,7 @@ from sim.robot import RobotModel
 from sim.robust import plan_grip
 from sim.scenario import Scenario
 from sim.settings import Control, stretched, tilting
+from sim.trace import torque_shares
 from synthesis import (
     InfeasibleError,
     InvalidInputError,
@@ -107,15 +108,9 @@ def feasibility(scenario: Scenario, control: Control) -> Feasibility:
     if joint_path is not None:
         names = RobotModel(scenario).joints
         clearances = dict(zip(names, joint_path.clearance.tolist(), strict=True))
-    grip = None
-    plain = PathProblems(scenario, control, joint_path is not None, joint_path)
-    tilts = plain.tilts(_STEP_DEG)
-    if joint_path is not None:
-        grip = _grip(scenario, control, joint_path)
-    problems = plain
-    if grip is not None:
-        problems = PathProblems(scenario, control, joint_path is not None, joint_path, grip)
-    synthesizer = Synthesizer()
+    grip = None if joint_path is None else _grip(scenario, control, joint_path)
+    problems = PathProblems(scenario, control, joint_path is not None, joint_path, grip)
+    tilts, synthesizer = problems.tilts(_STEP_DEG), Synthesizer()
     found = [_solve(problems.problem(tilt), synthesizer) for tilt in tilts.tolist()]
     curves = _curves(scenario, control, tilts, found, synthesizer)
     missing = [tilt for tilt, (_, s) in zip(tilts.tolist(), found, strict=True) if s is None]
@@ -207,7 +202,6 @@ def _torque(solution: Solution) -> tuple[str, float]:
     joints = solution.problem.joints
     if joints is None:
         return "", np.nan
-    limits = np.where(solution.tau > 0.0, joints.tau_max, -joints.tau_min)
-    shares = np.abs(solution.tau) / limits
+    shares = torque_shares(solution.tau, joints.tau_min, joints.tau_max)
     worst = int(np.argmax(shares))
     return joints.names[worst], float(shares[worst])

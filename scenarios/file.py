@@ -12,13 +12,15 @@ from typing import Any, TypeVar
 
 from pydantic import TypeAdapter, ValidationError
 
+from scenarios.file_access import Access
 from scenarios.file_build import build
 from scenarios.file_errors import FileError, Source, explained, nearest
 from scenarios.file_keys import Table
 from scenarios.file_models import LiftedFile, ScenarioFile
-from scenarios.file_places import Places, vector
+from scenarios.file_places import vector
 from sim.scenario import Pivot, Scenario, lifted
 from sim.settings import HOLD, tilting
+from synthesis import InvalidInputError
 
 SUFFIX = ".toml"
 SCENES = Path(__file__).parent / "scenes"
@@ -49,16 +51,7 @@ def made(source: Source, allowed: tuple[Path, ...] = ()) -> Scenario:
     """
     if "lifted_from" in source.data:
         return _lifted(source, _validated(source, LiftedFile), allowed)
-    return build(source, _validated(source, ScenarioFile), Places(source, allowed))
-
-
-def read_tables(file: Path) -> ScenarioFile:
-    """What a scenario file says, table by table: also what is no part of the scenario itself.
-
-    Raises:
-        FileError: It is not valid, or says no more than what it is lifted from.
-    """
-    return _validated(open_source(file), ScenarioFile)
+    return build(source, _validated(source, ScenarioFile), Access(source, allowed))
 
 
 def open_source(file: Path) -> Source:
@@ -97,10 +90,9 @@ def _lifted(source: Source, table: LiftedFile, allowed: tuple[Path, ...]) -> Sce
     if table.lifted_from in shipped:
         other = shipped[table.lifted_from]
     elif table.lifted_from.endswith(SUFFIX):
-        other = Places(source, allowed).file(key, table.lifted_from, "a scenario file")
+        other = Access(source, allowed).file(key, table.lifted_from, "a scenario file")
     else:
-        valid = f"{nearest(table.lifted_from, list(shipped))}, or a file ending in {SUFFIX}"
-        raise source.error(key, f'"{table.lifted_from}"', valid)
+        raise source.error(key, f'"{table.lifted_from}"', valid_names(table.lifted_from))
     if "lifted_from" in open_source(other).data:
         raise source.error(key, f'"{table.lifted_from}"', "a scenario that is not lifted itself")
     scenario = lifted(read(other, allowed))
@@ -122,6 +114,25 @@ def _lifted(source: Source, table: LiftedFile, allowed: tuple[Path, ...]) -> Sce
 def scene_files() -> dict[str, Path]:
     """The files of the scenes that ship, by name."""
     return {path.stem: path for path in sorted(SCENES.glob(f"*{SUFFIX}"))}
+
+
+def named_file(field: str, name: str) -> Path:
+    """The file of a scenario: of one that ships by its name, else by its path.
+
+    Raises:
+        InvalidInputError: It is neither; names the field in which it was given.
+    """
+    shipped = scene_files()
+    if name in shipped:
+        return shipped[name]
+    if not name.endswith(SUFFIX):
+        raise InvalidInputError(field, name, valid_names(name))
+    return Path(name)
+
+
+def valid_names(word: str) -> str:
+    """What a scenario may be called, where a word is none of it."""
+    return f"{nearest(word, list(scene_files()))}, or a file ending in {SUFFIX}"
 
 
 def schema() -> dict[str, Any]:

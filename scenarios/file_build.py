@@ -7,23 +7,24 @@ import math
 import numpy as np
 
 from assets import ROBOTS
+from scenarios.file_access import Access
 from scenarios.file_contacts import make_hand, make_support
 from scenarios.file_errors import Key, Source
 from scenarios.file_models import ScenarioFile
 from scenarios.file_motion import PosesTable, RobotTable, ScrewTable, TiltTable
 from scenarios.file_object import Thing, friction, make_object, make_surface, make_thing
-from scenarios.file_places import Places, apply, direction, only_one, orientation, vector
+from scenarios.file_places import direction, only_one, orientation, vector
 from scenarios.file_settings_build import control, phases, physics, tolerances
 from sim.scenario import Pivot, Pose, Poses, Rest, Robot, Scenario, Support, View
 
 
-def build(source: Source, file: ScenarioFile, places: Places) -> Scenario:
+def build(source: Source, file: ScenarioFile, access: Access) -> Scenario:
     """The scenario of a file, named as the file is.
 
     Raises:
         FileError: Something in it does not fit together.
     """
-    thing = make_thing(source, file.object, places)
+    thing = make_thing(source, file.object, access)
     geoms = {n: make_surface(source, n, table) for n, table in file.environment.items()}
     _check_names(source, file, thing)
     supports = tuple(
@@ -35,9 +36,9 @@ def build(source: Source, file: ScenarioFile, places: Places) -> Scenario:
             summary=file.summary,
             object=make_object(thing, file.object),
             environment=tuple(geoms.values()),
-            hands=tuple(make_hand(thing, n, hand, places) for n, hand in file.hands.items()),
+            hands=tuple(make_hand(thing, n, hand, access) for n, hand in file.hands.items()),
             supports=supports,
-            robots=tuple(_robot(source, i, r, places) for i, r in enumerate(file.robots)),
+            robots=tuple(_robot(source, i, r, access) for i, r in enumerate(file.robots)),
             path=_path(thing, file.path),
             rests=_rests(thing, file, supports),
             phases=phases(source, file.manoeuvre),
@@ -76,7 +77,7 @@ def _rests(thing: Thing, file: ScenarioFile, supports: tuple[Support, ...]) -> t
     )
 
 
-def _robot(source: Source, index: int, table: RobotTable, places: Places) -> Robot:
+def _robot(source: Source, index: int, table: RobotTable, access: Access) -> Robot:
     key: Key = ("robots", index)
     posture: dict[str, float] = {}
     for name, values, unit in (
@@ -91,7 +92,7 @@ def _robot(source: Source, index: int, table: RobotTable, places: Places) -> Rob
     what = "a URDF or MJCF file"
     with source.at(key):
         return Robot(
-            model=places.model((*key, "model"), table.model, tuple(ROBOTS), what),
+            model=access.model((*key, "model"), table.model, tuple(ROBOTS), what),
             posture=posture,
             prefix=table.prefix,
             still=tuple(table.still),
@@ -113,7 +114,7 @@ def _path(thing: Thing, table: TiltTable | ScrewTable | PosesTable) -> Pivot | P
         if table.axis is not None:
             raise source.error((*key, "axis"), table.axis, "left out where there is an edge")
         corners = [thing.corner((*key, "edge"), name) for name in table.edge]
-        first, second = (apply(thing.start, end) for end in corners)
+        first, second = (thing.start.in_parent(end) for end in corners)
         point, axis = (first + second) / 2.0, second - first
     else:
         given = table.axis

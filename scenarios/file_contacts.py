@@ -8,30 +8,29 @@ from collections.abc import Sequence
 import numpy as np
 
 from assets import HANDS
+from scenarios.file_access import Access
 from scenarios.file_errors import Key, Source, nearest
 from scenarios.file_models import HandTable, SupportTable, SurfaceTable
 from scenarios.file_object import Thing, friction, front
 from scenarios.file_places import (
     ON_SURFACE,
-    Places,
-    across,
-    apply,
     direction,
     only_one,
     surface_normal,
     turn,
-    undo,
+    usual_tangent,
     vector,
 )
+from sim.contacts import across
 from sim.scenario import Geom, Hand, Pose, Support, Vector
 from synthesis.contact import Array
 
-# How far from perpendicular a tangent may be typed in [-]: places are given to a micrometre, on
-# which the normal of a curved face depends. Less than the second is none.
+# How far from perpendicular a tangent may be typed in [-]: access are given to a micrometre, on
+# which the normal of a curved face depends. What is off by less than the second stays as it is.
 _ACROSS, _EXACT = 1e-3, 1e-12
 
 
-def make_hand(thing: Thing, name: str, table: HandTable, places: Places) -> Hand:
+def make_hand(thing: Thing, name: str, table: HandTable, access: Access) -> Hand:
     """A hand and where it holds the object.
 
     Raises:
@@ -44,7 +43,7 @@ def make_hand(thing: Thing, name: str, table: HandTable, places: Places) -> Hand
         return Hand(
             name=name,
             mount=table.mount,
-            model=places.model((*key, "tip"), table.tip, HANDS, "an MJCF file"),
+            model=access.model((*key, "tip"), table.tip, HANDS, "an MJCF file"),
             geom=thing.shape.touched(thing.name, point),
             p_OC_O=point,
             normal_O=normal,
@@ -98,11 +97,11 @@ def make_support(
         where: Key = ("environment", table.surface, "friction")
         raise source.error(where, "nothing", f"friction, such as {{ mu = 0.3 }}, for {name}")
     point = _support_point(thing, key, table)
-    p_W = apply(thing.start, point)
+    p_W = thing.start.in_parent(point)
     closest, outward = surface_normal(geoms[table.surface], front(surface), p_W)
     which = (*key, "corner" if table.corner is not None else "point_m")
     moved = f", or object.position_m = {_shown(thing.start.position + closest - p_W)}"
-    _check_near(source, which, point, undo(thing.start, closest), table.surface, moved)
+    _check_near(source, which, point, thing.start.in_frame(closest), table.surface, moved)
     normal = _normal(source, key, table.normal, direction(outward))
     return Support(
         name=name,
@@ -154,16 +153,15 @@ def _normal(source: Source, key: Key, given: list[float] | None, own: Vector) ->
 
 def _tangent(source: Source, key: Key, given: list[float] | None, normal: Vector) -> Vector:
     if given is None:
-        return across(normal)
+        return usual_tangent(normal)
     tangent = _direction(source, (*key, "tangent"), given)
-    if not abs(np.dot(tangent, normal)) < _ACROSS:
+    along = abs(np.dot(tangent, normal))
+    if not along < _ACROSS:
         valid = f"a direction across the normal {_shown(normal)}"
         raise source.error((*key, "tangent"), given, valid)
-    along = np.dot(tangent, normal)
-    if abs(along) < _EXACT:
+    if along < _EXACT:
         return tangent
-    across_it = np.subtract(tangent, along * np.asarray(normal))
-    return direction(across_it / np.linalg.norm(across_it))
+    return direction(across(np.asarray(tangent), np.asarray(normal)))
 
 
 def _direction(source: Source, key: Key, values: list[float]) -> Vector:

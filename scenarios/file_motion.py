@@ -15,7 +15,6 @@ from scenarios.file_keys import (
     Number,
     Placed,
     Positive,
-    Quaternion4,
     Table,
     Text,
     Vector3,
@@ -99,17 +98,11 @@ class ScrewTable(TurnTable):
     """Translation on top, in proportion to the tilt, at the end [m]."""
 
 
-class PoseTable(Table):
+class PoseTable(Placed):
     """A pose that the object passes."""
 
     position_m: Vector3
     """Position in the world [m]."""
-
-    rpy_deg: Vector3 | None = None
-    """Orientation as roll, pitch and yaw about the fixed axes x, y and z, in this order [deg]."""
-
-    quaternion: Quaternion4 | None = None
-    """Orientation as a quaternion wxyz, instead of rpy_deg."""
 
 
 class PosesTable(Table):

@@ -6,17 +6,17 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from scenarios.file_access import Access
 from scenarios.file_errors import Key, Source
 from scenarios.file_models import (
+    AnyObject,
     BoxTable,
     CylinderTable,
     FrictionTable,
     HollowCylinderTable,
-    MeshTable,
-    ObjectTable,
     SurfaceTable,
 )
-from scenarios.file_places import Places, apply, corner, only_one, orientation, vector
+from scenarios.file_places import corner, only_one, orientation, vector
 from sim.scenario import GRAVITY, Friction, Geom, Object, Pose, Vector
 from sim.shape import Shape, homogeneous
 from sim.shapes import Box, Cylinder, HollowCylinder, MeshShape
@@ -57,7 +57,7 @@ class Thing:
         return corner(self.shape.size, name)
 
 
-def make_thing(source: Source, table: ObjectTable, places: Places) -> Thing:
+def make_thing(source: Source, table: AnyObject, access: Access) -> Thing:
     """The object's shape and place.
 
     Raises:
@@ -65,10 +65,10 @@ def make_thing(source: Source, table: ObjectTable, places: Places) -> Thing:
     """
     start = Pose(vector(table.position_m), orientation(source, ("object",), table))
     with source.at(("object",)):
-        return Thing(source, table.name, _shape(table, places), start)
+        return Thing(source, table.name, _shape(table, access), start)
 
 
-def _shape(table: ObjectTable, places: Places) -> Shape:
+def _shape(table: AnyObject, access: Access) -> Shape:
     if isinstance(table, BoxTable):
         return Box(vector(table.size_m))
     if isinstance(table, CylinderTable):
@@ -76,12 +76,11 @@ def _shape(table: ObjectTable, places: Places) -> Shape:
     if isinstance(table, HollowCylinderTable):
         radii = table.outer_radius_m, table.inner_radius_m
         return HollowCylinder(*radii, table.length_m, table.axis)
-    assert isinstance(table, MeshTable)
-    mesh = places.file(("object", "file"), table.file, "a mesh file (STL, OBJ or PLY)")
+    mesh = access.file(("object", "file"), table.file, "a mesh file (STL, OBJ or PLY)")
     return MeshShape(str(mesh), table.scale)
 
 
-def make_object(thing: Thing, table: ObjectTable) -> Object:
+def make_object(thing: Thing, table: AnyObject) -> Object:
     """The object with its mass.
 
     Raises:
@@ -114,7 +113,7 @@ def make_surface(source: Source, name: str, surface: SurfaceTable) -> Geom:
         FileError: Its kind has another number of lengths, or no front.
     """
     key: Key = ("environment", name)
-    turned = orientation(source, key, surface)
+    quaternion = orientation(source, key, surface)
     at, size = np.asarray(surface.position_m), surface.size_m
     count = 2 if surface.kind in ("floor", "post") else 3
     if len(size) != count:
@@ -125,11 +124,11 @@ def make_surface(source: Source, name: str, surface: SurfaceTable) -> Geom:
     rgba = colour(surface.rgba)
     if surface.kind == "floor":
         half = (size[0] / 2, size[1] / 2, _GRID)
-        return Geom(name, "plane", half, Pose(vector(at), turned), rgba, surface.solid)
+        return Geom(name, "plane", half, Pose(vector(at), quaternion), rgba, surface.solid)
     half_sizes = tuple(length / 2 for length in size)
     lengths = (size[0], *size) if surface.kind == "post" else size
     behind = -np.asarray(front(surface)) * lengths / 2
-    pose = Pose(vector(apply(Pose(vector(at), turned), vector(behind))), turned)
+    pose = Pose(vector(Pose(vector(at), quaternion).in_parent(vector(behind))), quaternion)
     kind = "cylinder" if surface.kind == "post" else "box"
     return Geom(name, kind, half_sizes, pose, rgba, surface.solid)
 

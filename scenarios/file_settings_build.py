@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 from scenarios.file_errors import Source
+from scenarios.file_places import vector
 from scenarios.file_settings import (
     ControlTable,
     ManoeuvreTable,
@@ -86,10 +87,10 @@ def control(table: ControlTable) -> Control:
 def _robustness(table: RobustnessTable) -> Robustness:
     uncertainty = UncertaintySet(
         mass=table.mass,
-        center=_three(table.center_m),
+        center=vector(table.center_m),
         friction=table.friction,
-        push=_three(table.push_n),
-        lever=_three(table.lever_m),
+        push=vector(table.push_n),
+        lever=vector(table.lever_m),
         placement=table.placement_m,
     )
     return Robustness(uncertainty, preload=table.preload_n, reaction=table.reaction_n)
@@ -103,7 +104,7 @@ def physics(table: PhysicsTable) -> Physics:
         impratio=table.impratio,
         noslip_iterations=table.noslip_iterations,
         solref=(time, ratio),
-        solimp=_three(table.solimp),
+        solimp=vector(table.solimp),
         solref_friction=(friction_time, friction_ratio),
     )
 
@@ -111,8 +112,3 @@ def physics(table: PhysicsTable) -> Physics:
 def tolerances(table: TolerancesTable) -> Tolerances:
     """What counts as success."""
     return Tolerances(**table.model_dump())
-
-
-def _three(values: list[float]) -> tuple[float, float, float]:
-    x, y, z = values
-    return (x, y, z)

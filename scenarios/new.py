@@ -95,19 +95,9 @@ class New:
 
     def _origin(self) -> Path:
         """The file to begin with."""
-        from scenarios.file import SUFFIX, TEMPLATE, scene_files
-        from scenarios.file_errors import nearest
-        from synthesis.errors import InvalidInputError
+        from scenarios.file import TEMPLATE, named_file
 
-        if self.origin is None:
-            return TEMPLATE
-        shipped = scene_files()
-        if self.origin in shipped:
-            return shipped[self.origin]
-        if not self.origin.endswith(SUFFIX):
-            valid = f"{nearest(self.origin, list(shipped))}, or a file ending in {SUFFIX}"
-            raise InvalidInputError("--from", self.origin, valid)
-        return Path(self.origin)
+        return TEMPLATE if self.origin is None else named_file("--from", self.origin)
 
 
 def _short(length: float) -> float:

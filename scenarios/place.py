@@ -115,9 +115,9 @@ class Place(Chosen):
         Raises:
             FileError: It says no more than that another scenario is lifted.
         """
-        from scenarios.file import open_source, scene_files
+        from scenarios.file import named_file, open_source
 
-        source = open_source(scene_files().get(self.scenario, Path(self.scenario)))
+        source = open_source(named_file("scenario", self.scenario))
         if "lifted_from" in source.data:
             other = f'"{source.data["lifted_from"]}"'
             raise source.error(("lifted_from",), other, "left out: place that one instead")

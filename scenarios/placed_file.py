@@ -9,7 +9,6 @@ from typing import Any
 import tomlkit
 
 from scenarios.file import SCHEMA
-from sim.path import rotation
 from sim.placement_face import coordinates
 from sim.scenario import Hand, Robot, Scenario
 from sim.shape import Shape
@@ -54,7 +53,7 @@ def _stand(table: Any, old: Robot, new: Robot) -> None:
         if "quaternion" in table:
             table["quaternion"] = _numbers(new.base.quaternion, _DIRECTION_DIGITS)
         else:
-            table["rpy_deg"] = _numbers(rotation(new.base).as_euler("xyz", degrees=True))
+            table["rpy_deg"] = _numbers(new.base.rotation.as_euler("xyz", degrees=True))
     for joint, angle in new.posture.items():
         if angle == old.posture[joint]:
             continue

@@ -103,5 +103,11 @@ def contact_axes(normal: Vector, tangent: Vector) -> Array:
     return np.column_stack([t, np.cross(n, t), n])
 
 
+def across(vector: Array, normal: Array) -> Array:
+    """The part of a vector that is across a unit normal, made a unit vector, (3,) each."""
+    part = vector - vector.dot(normal) * normal
+    return part / np.linalg.norm(part)
+
+
 def _stack(matrices: list[Array]) -> Array:
     return np.array(matrices).reshape(-1, 3, 3)

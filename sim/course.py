@@ -9,7 +9,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from sim.checks import length
-from sim.pose import Pose, Vector
+from sim.pose import Pose, Vector, triple
 from synthesis import InvalidInputError
 from synthesis.contact import Array
 
@@ -114,8 +114,7 @@ class Poses:
     @cached_property
     def point_W(self) -> Vector:
         """Where that point is at the start [m]."""
-        x, y, z = (self.positions[0] + self.rotations[0].apply(self.pivot_O)).tolist()
-        return (x, y, z)
+        return triple(self.positions[0] + self.rotations[0].apply(self.pivot_O))
 
     def scaled(self, factor: float) -> Poses:
         """That of an object which is so many times as large, about the same point."""
@@ -126,5 +125,4 @@ class Poses:
 def _scaled(pose: Pose, factor: float, point: Array) -> Pose:
     p_WO = np.asarray(pose.position)
     # Of a factor of 1 not even the last bit differs.
-    x, y, z = (p_WO + (factor - 1.0) * (p_WO - point)).tolist()
-    return replace(pose, position=(x, y, z))
+    return replace(pose, position=triple(p_WO + (factor - 1.0) * (p_WO - point)))

@@ -10,7 +10,6 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial.transform import Rotation
 
 from sim.scenario import Scenario
 from synthesis import InvalidInputError
@@ -159,8 +158,7 @@ def check_contacts(scenario: Scenario) -> None:
         geom = geoms[name]
         if geom.file is None:
             continue
-        turn = Rotation.from_quat(geom.pose.quaternion, scalar_first=True)
-        p_G = turn.inv().apply(np.subtract(place, geom.pose.position))
+        p_G = geom.pose.in_frame(place)
         depth = read_mesh(f"{name}.file", geom.file, geom.size).inside_hull(p_G)
         if depth > _INSIDE_HULL:
             valid = f"at most {1e3 * _INSIDE_HULL:g} mm inside the convex hull of {name}, which is "

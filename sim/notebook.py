@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from sim.scenario import GRAVITY
-from synthesis.markdown import escaped, number, page, table
+from synthesis.markdown import escaped, number, numbers, page, table
 
 if TYPE_CHECKING:
     from sim.plan import Plan
@@ -31,7 +31,7 @@ def scenario_markdown(scenario: Scenario) -> str:
             number(hand.friction.mu),
             number(hand.friction.e_n) if hand.friction.e_n is not None else "",
             number(hand.f_n_max),
-            _numbers(hand.p_OC_O),
+            numbers(hand.p_OC_O, 3),
         )
         for hand in scenario.hands
     ]
@@ -42,7 +42,7 @@ def scenario_markdown(scenario: Scenario) -> str:
             number(support.friction.mu),
             "",
             "∞",
-            _numbers(support.p_OP_O),
+            numbers(support.p_OP_O, 3),
         )
         for support in scenario.supports
     ]
@@ -59,11 +59,11 @@ def scenario_markdown(scenario: Scenario) -> str:
     return page(
         f"**{escaped(scenario.name)}**: {escaped(scenario.summary)}",
         f"Object {escaped(thing.name)}: {number(thing.mass)} kg ({number(thing.mass * GRAVITY)} N)"
-        f", centre of mass at ({_numbers(thing.center_of_mass)}) m. Tilt by "
+        f", centre of mass at ({numbers(thing.center_of_mass, 3)}) m. Tilt by "
         f"{number(path.angle_deg)} deg.",
         table(
             ("robot", "prefix of its names", "stands at [m]", "driven joints"),
-            [(r.model, r.prefix, _numbers(r.base.position), len(r.posture)) for r in robots],
+            [(r.model, r.prefix, numbers(r.base.position, 3), len(r.posture)) for r in robots],
         ),
         table(
             ("contact", "what", "μ", "e_n [m]", "f_n at most [N]", "place on the object [m]"),
@@ -71,10 +71,6 @@ def scenario_markdown(scenario: Scenario) -> str:
         ),
         table(("phase", "takes [s]", "tilt [deg]", "gap [mm]", "grip [%]"), phases),
     )
-
-
-def _numbers(vector: tuple[float, ...]) -> str:
-    return ", ".join(number(x, 3) for x in vector)
 
 
 def report_markdown(report: Report) -> str:

@@ -10,7 +10,6 @@ from scipy.interpolate import CubicSpline
 from scipy.spatial.transform import Rotation, RotationSpline
 
 from sim.course import Pivot, Poses
-from sim.pose import Pose
 from sim.scenario import Scenario
 from synthesis import InvalidInputError
 from synthesis.contact import Array
@@ -27,11 +26,6 @@ _REFINEMENTS = 4
 _APART = 0.5
 _NO_SLOPE = np.zeros(3)
 _NO_SLOPE.setflags(write=False)
-
-
-def rotation(pose: Pose) -> Rotation:
-    """Orientation of a pose (whose quaternion is wxyz)."""
-    return Rotation.from_quat(pose.quaternion, scalar_first=True)
 
 
 class ObjectPath(ABC):
@@ -115,7 +109,7 @@ class ScrewPath(ObjectPath):
         self.point = np.asarray(pivot.point_W, float)
         # Translation per radian on top of the turn [m].
         self.advance = pivot.pitch * self.direction + np.asarray(pivot.travel, float) / self.end
-        self._R_WO = rotation(pivot.start)
+        self._R_WO = pivot.start.rotation
         # With q_0 the start, q times the inverse of q_0 has the real part cos(tilt / 2) and, along
         # the axis, the part sin(tilt / 2): both are linear in q, with these rows.
         q_0 = self._R_WO.as_quat(scalar_first=True)

@@ -31,9 +31,10 @@ from sim.placement_value import COARSE, FULL, Goal, Value, assess, settled, touc
 from sim.report import Report, Verdict
 from sim.run import Request, execute
 from sim.scenario import Scenario
-from sim.settings import controllers
+from sim.settings import Control
+from sim.settings import controller as control_named
 from sim.sweep.farm import Workers, cluster
-from synthesis import FulcrumError, InvalidInputError
+from synthesis import FulcrumError
 from synthesis.contact import Array
 
 # Placements of a generation, at most and at least: even shares for 1, 2 and 4 processes.
@@ -115,6 +116,7 @@ class _Task:
 
     scenario: Scenario
     controller: str
+    control: Control
     goal: Goal
     freedom: Freedom
 
@@ -143,10 +145,8 @@ def search(
     """
     started = time.monotonic()
     effort = effort or Effort()
-    known = controllers(scenario.control)
-    if controller not in known:
-        raise InvalidInputError("controller", controller, f"one of {', '.join(known)}")
-    packed = pickle.dumps(_Task(scenario, controller, goal, freedom or Freedom()))
+    control = control_named(scenario.control, controller)
+    packed = pickle.dumps(_Task(scenario, controller, control, goal, freedom or Freedom()))
     moves = _shared(packed).moves
     report = progress or (lambda done, total, note: None)
     with _processes(effort.workers) as call:
@@ -263,8 +263,7 @@ def _cost(packed: bytes, x: Array) -> float:
     """Of a placement, looked at coarsely."""
     shared = _shared(packed)
     task, candidate = shared.task, shared.moves.scenario(x)
-    control = controllers(task.scenario.control)[task.controller]
-    return assess(candidate, control, task.goal, COARSE, shared.tolerated, whole=False).cost
+    return assess(candidate, task.control, task.goal, COARSE, shared.tolerated, whole=False).cost
 
 
 def _look(packed: bytes, x: Array | None) -> tuple[Scenario, Value]:
@@ -275,18 +274,16 @@ def _look(packed: bytes, x: Array | None) -> tuple[Scenario, Value]:
         candidate = shared.moves.scenario(x)
         with contextlib.suppress(PathError):  # which the value says, too
             candidate = settled(candidate)
-    control = controllers(task.scenario.control)[task.controller]
-    return candidate, assess(candidate, control, task.goal, FULL, shared.tolerated)
+    return candidate, assess(candidate, task.control, task.goal, FULL, shared.tolerated)
 
 
 def _run(packed: bytes, candidate: Scenario) -> Report | str:
     """The report of a placement's closed-loop run if it passes, else why it does not."""
     task = _shared(packed).task
-    control = controllers(task.scenario.control)[task.controller]
     try:
-        report = execute(Request(candidate, task.controller, control)).report
+        report = execute(Request(candidate, task.controller, task.control)).report
     except FulcrumError as error:
-        return f"{error}"
+        return str(error)
     return report if report.verdict is Verdict.PASS else "; ".join(report.failures)
 
 

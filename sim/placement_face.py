@@ -8,8 +8,10 @@ import numpy as np
 from scipy.optimize import minimize
 from scipy.spatial.transform import Rotation
 
+from sim.contacts import across
+from sim.pose import triple
 from sim.scenario import Hand, Scenario, Vector
-from sim.shape import Shape, triple
+from sim.shape import Shape
 from synthesis import InvalidInputError
 from synthesis.contact import Array
 
@@ -116,9 +118,7 @@ def moved(hand: Hand, point: Vector, normal: Vector, shape: Shape) -> Hand:
     sine = float(np.linalg.norm(axis))
     # The normal of the opposite face is reached by a turn about the tangent, which stays.
     turn = np.zeros(3) if sine < 1e-9 else np.arctan2(sine, cosine) / sine * axis
-    tangent = Rotation.from_rotvec(turn).apply(hand.tangent_O)
-    tangent -= (tangent @ new) * new
-    tangent /= np.linalg.norm(tangent)
+    tangent = across(Rotation.from_rotvec(turn).apply(hand.tangent_O), new)
     geom = shape.touched(hand.geom, point)
     return replace(hand, p_OC_O=point, normal_O=normal, tangent_O=triple(tangent), geom=geom)
 

@@ -10,12 +10,11 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from sim.contacts import contact_axes
-from sim.path import rotation
 from sim.placement_face import Range, faces_of, moved, shape_of
 from sim.placement_mirror import chains, find_mirror
+from sim.pose import triple, wxyz
 from sim.scenario import Hand, Pose, Robot, Scenario
 from sim.scene import compose
-from sim.shape import triple
 from synthesis import InvalidInputError
 from synthesis.contact import Array
 
@@ -97,7 +96,7 @@ class Moves:
         allowed = dict.fromkeys(names, ()) if freedom.faces is None else freedom.faces
         for name in allowed:
             if name not in names:
-                raise InvalidInputError("freedom.faces", name, f"of {', '.join(names)}")
+                raise InvalidInputError("freedom.faces", name, f"one of {', '.join(names)}")
         followers = () if self.mirror is None else (self.mirror.hands[1].name,)
         self._leaders = [hand for hand in scenario.hands if hand.name not in followers]
         self._faces = {
@@ -119,7 +118,8 @@ class Moves:
         ]
         variables = [v for v in variables if v.high > v.low]
         if not variables:
-            raise InvalidInputError("freedom", freedom, "one with something that may move")
+            valid = "one with something that may move"
+            raise InvalidInputError("freedom", "one in which all stays", valid)
         self.names = tuple(v.name for v in variables)
         self._low = np.array([v.low for v in variables])
         self._high = np.array([v.high for v in variables])
@@ -238,5 +238,4 @@ def _based(robot: Robot, scenario: Scenario, values: dict[str, float]) -> Robot:
         return replace(robot, base=Pose(position, base.quaternion))
     turn = Rotation.from_rotvec([0.0, 0.0, math.radians(degrees)])
     position = triple(point + turn.apply(np.asarray(base.position) - point) + moves)
-    w, x, y, z = (turn * rotation(base)).as_quat(scalar_first=True).tolist()
-    return replace(robot, base=Pose(position, (w, x, y, z)))
+    return replace(robot, base=Pose(position, wxyz(turn * base.rotation)))

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import mujoco
 import numpy as np
 
 from sim.contacts import ContactFrames
 from sim.path import ObjectPath, object_path
+from sim.pose import triple
 from sim.scenario import Hand, Scenario, Vector
 from sim.scene import compose, hand_body
 from synthesis.contact import Array
@@ -40,12 +41,12 @@ class Mirror:
     def point(self, p_O: Vector) -> Vector:
         """Image of a point in the object's frame [m]."""
         p = np.asarray(p_O, float)
-        return _vector(p - 2.0 * self.normal_O.dot(p - self.point_O) * self.normal_O)
+        return triple(p - _twice(p - self.point_O, self.normal_O))
 
     def direction(self, v_O: Vector) -> Vector:
         """Image of a direction in the object's frame."""
         v = np.asarray(v_O, float)
-        return _vector(v - 2.0 * self.normal_O.dot(v) * self.normal_O)
+        return triple(v - _twice(v, self.normal_O))
 
 
 def chains(scene: mujoco.MjModel, scenario: Scenario) -> dict[str, tuple[str, ...]]:
@@ -90,9 +91,7 @@ def find_mirror(scenario: Scenario) -> Mirror | None:
     if not all(np.allclose(a, b, rtol=0.0, atol=_ALIKE) for a, b in images):
         return None
     joints = _images(scenario, normal, center)
-    if joints is None:
-        return None
-    return Mirror((first, second), normal, center, normal_O, point_O, joints)
+    return None if joints is None else replace(mirror, joints=joints)
 
 
 def _stays(path: ObjectPath, normal: Array) -> bool:
@@ -116,15 +115,11 @@ def _images(
     first, second = chains(scene, scenario).values()
     if len(first) != len(second) or set(first) & set(second):
         return None
-
-    def image(v: Array) -> Array:
-        return v - 2.0 * normal.dot(v) * normal
-
     found = {}
     for name, other in zip(first, second, strict=True):
         a, b = scene.joint(name).id, scene.joint(other).id
-        axis = image(data.xaxis[a])
-        anchor = center + image(data.xanchor[a] - center)
+        axis, arm = data.xaxis[a], data.xanchor[a] - center
+        axis, anchor = axis - _twice(axis, normal), center + (arm - _twice(arm, normal))
         sign = float(np.sign(axis @ data.xaxis[b]))
         apart = np.cross(anchor - data.xanchor[b], axis)
         if np.abs(axis - sign * data.xaxis[b]).max() > _ALIKE or np.abs(apart).max() > _ALIKE:
@@ -135,6 +130,6 @@ def _images(
     return found
 
 
-def _vector(v: Array) -> Vector:
-    x, y, z = map(float, v)
-    return x, y, z
+def _twice(v: Array, normal: Array) -> Array:
+    """What a reflection takes from a vector: twice its part along the unit normal, (3,)."""
+    return 2.0 * normal.dot(v) * normal

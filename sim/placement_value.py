@@ -125,8 +125,8 @@ def assess(
         joint_path = plan_joints(scenario, steps.solved, steps.grid)
     except PathError as error:
         if not error.share:
-            return Value(_OUT_OF_REACH + error.error / (1.0 + error.error), f"{error}")
-        return Value(_STUCK + 1.0 - error.share, f"{error}")
+            return Value(_OUT_OF_REACH + error.error / (1.0 + error.error), str(error))
+        return Value(_STUCK + 1.0 - error.share, str(error))
     robot = RobotModel(scenario)
     kept = steps.room * np.minimum(robot.q_max - robot.q_min, _TURN)
     tight = int((joint_path.clearance - kept).argmin())

@@ -8,6 +8,7 @@ from typing import NamedTuple, TypeAlias
 import numpy as np
 
 from sim.checks import positive, vector
+from sim.pose import triple
 from sim.scenario import Geom, Object, Quaternion, Vector
 from synthesis import InvalidInputError
 from synthesis.contact import Array
@@ -119,13 +120,6 @@ def homogeneous(name: str, shape: Shape, mass: float, rgba: Color = COLOR) -> Ob
     )
 
 
-def turned(axis: str, along: float, first: float, second: float) -> Vector:
+def cyclic(axis: str, along: float, first: float, second: float) -> Vector:
     """A vector by its components along an axis and along the two that come after it."""
-    x, y, z = np.roll([along, first, second], AXES.index(axis)).tolist()
-    return (x, y, z)
-
-
-def triple(values: Array) -> Vector:
-    """The numbers of an array, (3,)."""
-    x, y, z = values.tolist()
-    return (x, y, z)
+    return triple(np.roll([along, first, second], AXES.index(axis)))

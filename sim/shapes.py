@@ -12,8 +12,9 @@ from scipy.spatial.transform import Rotation
 
 from sim.checks import length, positive
 from sim.meshes import Mesh, read_mesh
+from sim.pose import triple, wxyz
 from sim.scenario import Geom, Pose, Quaternion, Vector
-from sim.shape import AXES, COLOR, UNTURNED, Color, Place, Shape, triple, turned
+from sim.shape import AXES, COLOR, UNTURNED, Color, Place, Shape, cyclic
 from synthesis import InvalidInputError
 from synthesis.contact import Array
 
@@ -80,7 +81,7 @@ class Box(Shape):
 
     def _place(self, face: str, u: float, v: float) -> Place:
         axis, side = AXES.index(face[1]), 1.0 if face[0] == "+" else -1.0
-        shares = turned(face[1], (side + 1.0) / 2.0, u, v)
+        shares = cyclic(face[1], (side + 1.0) / 2.0, u, v)
         point = (np.array(shares) - 0.5) * self.size
         return Place(triple(point), triple(0.0 - side * np.eye(3)[axis]), face)
 
@@ -123,7 +124,7 @@ class _Round(Shape):
         inner, outer = self._radii
         along = mass / 2 * (outer**2 + inner**2)
         across = mass / 12 * (3 * (outer**2 + inner**2) + self.length**2)
-        return turned(self.axis, along, across, across)
+        return cyclic(self.axis, along, across, across)
 
     def _full(self, name: str, rgba: Color, solid: bool = True) -> Geom:
         size = (self._radii[1], self.length / 2)
@@ -154,12 +155,12 @@ class _Round(Shape):
     def _at(self, face: str, radius: float, angle: float, along: float) -> Place:
         """The point at a radius [m], an angle about the axis [rad] and a place along it [m]."""
         across = (math.cos(angle), math.sin(angle))
-        point = turned(self.axis, along, radius * across[0], radius * across[1])
+        point = cyclic(self.axis, along, radius * across[0], radius * across[1])
         if face in self._walls:
             inward = -1.0 if radius == self._radii[1] else 1.0
-            normal = turned(self.axis, 0.0, inward * across[0], inward * across[1])
+            normal = cyclic(self.axis, 0.0, inward * across[0], inward * across[1])
         else:
-            normal = turned(self.axis, -math.copysign(1.0, along), 0.0, 0.0)
+            normal = cyclic(self.axis, -math.copysign(1.0, along), 0.0, 0.0)
         return Place(point, normal, face)
 
 
@@ -248,9 +249,9 @@ class HollowCylinder(_Round):
         angle, middle = 2 * math.pi * i / _STAVES, (outer + inner) / 2
         at = (-middle * math.sin(angle), middle * math.cos(angle))
         half = (self.length / 2, inner * math.tan(math.pi / _STAVES), (outer - inner) / 2)
-        turn = (math.cos(angle / 2), *turned(self.axis, math.sin(angle / 2), 0.0, 0.0))
-        pose = Pose(turned(self.axis, 0.0, *at), turn)
-        return Geom(_stave_name(i), "box", turned(self.axis, *half), pose, rgba)
+        turn = (math.cos(angle / 2), *cyclic(self.axis, math.sin(angle / 2), 0.0, 0.0))
+        pose = Pose(cyclic(self.axis, 0.0, *at), turn)
+        return Geom(_stave_name(i), "box", cyclic(self.axis, *half), pose, rgba)
 
     def touched(self, name: str, p_O: Vector) -> str:
         """Name of that of its staves which a hand touches at a place."""
@@ -314,8 +315,7 @@ class MeshShape(Shape):
     @property
     def principal_axes(self) -> Quaternion:
         """Orientation of the principal axes in the object frame, wxyz."""
-        w, x, y, z = Rotation.from_matrix(self.mesh.axes).as_quat(scalar_first=True).tolist()
-        return (w, x, y, z)
+        return wxyz(Rotation.from_matrix(self.mesh.axes))
 
     def inertia(self, mass: float) -> Vector:
         """Principal moments about the centre of mass, if homogeneous [kg m^2]."""

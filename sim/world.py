@@ -13,6 +13,7 @@ import numpy as np
 from sim.checks import finite, not_negative, positive, vector
 from sim.contacts import contact_axes
 from sim.faults import Fault
+from sim.pose import triple
 from sim.scenario import Friction, Geom, Hand, Object, Rest, Scenario, Support, Vector
 from sim.scene import hand_body, tip_site
 from synthesis import InvalidInputError
@@ -150,14 +151,14 @@ class World:
             mass=self.mass * thing.mass,
             inertia=_scaled(self.mass * self.size**2, thing.inertia),
             geoms=geoms,
-            center_of_mass=_vector(center),
+            center_of_mass=triple(center),
             shape=None if thing.shape is None else thing.shape.scaled(self.size),
         )
 
     def _hand(self, hand: Hand, friction: float, place: tuple[float, float]) -> Hand:
         p_OC_O = self.size * np.asarray(hand.p_OC_O)
         p_OC_O += contact_axes(hand.normal_O, hand.tangent_O)[:, :2] @ place
-        return replace(hand, friction=_slipperier(hand.friction, friction), p_OC_O=_vector(p_OC_O))
+        return replace(hand, friction=_slipperier(hand.friction, friction), p_OC_O=triple(p_OC_O))
 
     def _support(self, support: Support, friction: float) -> Support:
         return replace(
@@ -219,8 +220,3 @@ def _rest(rest: Rest, supports: tuple[Support, ...]) -> Rest:
 def _scaled(factor: float, vector: Vector) -> Vector:
     x, y, z = vector
     return (factor * x, factor * y, factor * z)
-
-
-def _vector(values: np.ndarray) -> Vector:
-    x, y, z = values.tolist()
-    return (x, y, z)

@@ -28,6 +28,11 @@ def number(value: float, digits: int = 4) -> str:
     return f"{value:.{digits}g}"
 
 
+def numbers(values: Iterable[float], digits: int = 4) -> str:
+    """Several such numbers with commas between."""
+    return ", ".join(number(value, digits) for value in values)
+
+
 def table(head: Sequence[str], rows: Iterable[Sequence[object]]) -> list[str]:
     """The lines of a table; empty without rows.
 

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from synthesis.contact import M_N, ContactModel, N, O, T
-from synthesis.markdown import escaped, number, page, table
+from synthesis.markdown import escaped, number, numbers, page, table
 
 if TYPE_CHECKING:
     from synthesis.problem import Problem
@@ -31,11 +31,11 @@ def problem_markdown(problem: Problem) -> str:
                 number(contact.mu) if rough else "",
                 number(contact.e_n) if contact.model is ContactModel.SFCE else "",
                 f"{number(contact.f_n_min)} to {number(contact.f_n_max)}",
-                ", ".join(number(x, 3) for x in p),
+                numbers(p, 3),
             )
         )
     head = ("contact", "role", "model", "μ", "e_n [m]", "f_n [N]", "place on the object [m]")
-    force, moment = (", ".join(number(x) for x in w) for w in np.split(problem.w_ext_O, 2))
+    force, moment = map(numbers, np.split(problem.w_ext_O, 2))
     joints = problem.joints
     return page(
         f"**Problem (17)**: minimise {escaped(problem.objective)}",

@@ -64,11 +64,11 @@ class GivenMotion:
             load: The load.
             known: Forces with other loads, (S, m, 6) each, that may serve with a small change.
         """
-        balance = _Balance(load, self._point, self._motion)
+        balance = _Balance(self._problem, load, self._point, self._motion)
         result, lacking = known[0].copy(), np.ones(len(self._point), bool)
         for w_OC_C in known:
             changed = balance.restored(w_OC_C)
-            serves = lacking & balance.kept(changed, self._used, self._problem, self._motion)
+            serves = lacking & balance.kept(changed, self._used)
             result[serves] = changed[serves]
             lacking &= ~serves
         if not lacking.any():
@@ -106,8 +106,9 @@ class GivenMotion:
 class _Balance:
     """Equilibrium and limits of one load at all stations."""
 
-    def __init__(self, load: Load, point: Array, motion: Array) -> None:
+    def __init__(self, problem: PathProblem, load: Load, point: Array, motion: Array) -> None:
         self._load, self._point, self._facts = load, point, load.problems[0].contact_set
+        self._own, self._motion = problem.inertial_torques, motion
         self._G = np.stack([p.G for p in load.problems])[point]
         self._G = self._G.transpose(0, 2, 1, 3).reshape(len(point), 6, -1)
         a, b = motion[:, :, None]
@@ -132,7 +133,7 @@ class _Balance:
         x = np.linalg.solve(matrix, r[..., None])
         return (flat + D * (GD.transpose(0, 2, 1) @ x)[..., 0]).reshape(shape)
 
-    def kept(self, w_OC_C: Array, used: float, problem: PathProblem, motion: Array) -> Mask:
+    def kept(self, w_OC_C: Array, used: float) -> Mask:
         """Where forces are in equilibrium and keep all limits, (S,)."""
         facts, point, f_n = self._facts, self._point, w_OC_C[..., N]
         flat = w_OC_C.reshape(len(point), -1)
@@ -143,15 +144,15 @@ class _Balance:
         bounded = f_n[:, supports]
         kept &= (bounded >= facts.f_n_min[supports]).all(axis=1)
         kept &= (bounded <= facts.f_n_max[supports]).all(axis=1)
-        joints = [p.joints for p in self._load.problems if p.joints is not None]
-        own = problem.inertial_torques
+        own = self._own
         if own is None:
             return kept
+        joints = [p.joints for p in self._load.problems if p.joints is not None]
         hands = list(facts.hands)
         J = np.stack([j.J_C for j in joints])[point]
         tau = np.stack([j.tau_g for j in joints])[point]
         tau = tau + np.einsum("snkl,snk->sl", J, w_OC_C[:, hands])
-        a, b = motion[:, :, None]
+        a, b = self._motion[:, :, None]
         tau = tau + own.tau_a[point] * a + own.tau_b[point] * b + own.tau_c[point] * np.sqrt(b)
         kept &= (tau <= np.stack([j.tau_max for j in joints])[point]).all(axis=1)
         kept &= (tau >= np.stack([j.tau_min for j in joints])[point]).all(axis=1)

@@ -57,7 +57,8 @@ def test_the_box_run_is_8_s_of_tilt_at_1_khz_with_250_syntheses_a_second():
 
 def test_the_requirements_catch_the_box_on_every_count():
     # Each count is missed in at least one of the runs that must fail (torque and synthesis: above).
-    missed = set().union(*(violated(BOX, *run(BOX, case)[1:]) for case in FAILING))
+    cases = [case for name, case in FAILING if name == BOX]
+    missed = set().union(*(violated(BOX, *run(BOX, case)[1:]) for case in cases))
     everything = "kept slip slide spin utilisation force"
     assert missed >= {*everything.split(), "tilt error", "final tilt"}
 

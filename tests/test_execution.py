@@ -36,7 +36,7 @@ TICK = 0.001
 # --- the bars
 
 
-@pytest.mark.parametrize(("name", "stretch"), [(BOX, 1.0), (BOX, 1.5), (CYLINDER, 1.2)])
+@pytest.mark.parametrize(("name", "stretch"), [(BOX, 1.0), (CYLINDER, 1.2)])
 def test_a_planned_tilt_is_executed_within_the_bars(name, stretch):
     result = executed(name, stretch)
     assert broken(name, result) == set()
@@ -245,23 +245,17 @@ def test_where_there_is_no_plan_one_sentence_says_why(tmp_path, capsys, command)
 
 
 def test_an_episode_of_a_sweep_executes_the_plan_and_its_replay_says_so():
-    planning = Planning(1.5)
-    planned = execution(CYLINDER, 1.5)
-    sweep = Sweep(planned.scenario, ("dynamic",), "nominal", episodes=1, seed=3, planning=planning)
+    planned = execution(CYLINDER, 1.2)
+    sweep = Sweep(
+        planned.scenario, ("dynamic",), "nominal", episodes=1, seed=0, planning=Planning(1.2)
+    )
     (episode,) = sweep.all_episodes()
     assert sweep.replay(episode) == (
-        "fulcrum run cylinder-tilt --controller dynamic --preset nominal --seed 3 "
-        "--plan least-time --stretch 1.5"
+        "fulcrum run cylinder-tilt --controller dynamic --preset nominal --seed 0 "
+        "--plan least-time --stretch 1.2"
     )
     row = run_episode(pickle.dumps(sweep), episode)
     assert row["success"]
-    replay = Request(
-        scenario(CYLINDER),
-        "dynamic",
-        controllers(scenario(CYLINDER).control)["dynamic"],
-        seed=3,
-        world=sweep.world(episode),
-        planning=planning,
-    )
-    again = execute(replay, prepared=Preparation.of(planned))
-    assert row["tilt.max_error_deg"] == again.report.tilt.max_error_deg
+    # A world of the nominal preset deviates in nothing from what the other tests run.
+    assert row["tilt.max_error_deg"] == executed(CYLINDER, 1.2).report.tilt.max_error_deg
+    assert row["tilt.max_error_deg"] != executed(BOX, 1.0).report.tilt.max_error_deg

@@ -10,7 +10,7 @@ from scipy.linalg import expm
 from scipy.spatial.transform import Rotation
 
 from scenarios import scenario
-from sim.path import ScrewPath, minimum_jerk, rotation
+from sim.path import ScrewPath, minimum_jerk
 from sim.scenario import Pivot, Pose
 from synthesis import InvalidInputError
 
@@ -42,7 +42,7 @@ def exponential(pivot, tilt):
     screw = np.zeros((4, 4))
     screw[:3, :3] = np.cross(np.eye(3), axis)
     screw[:3, 3] = -np.cross(axis, pivot.point_W) + pivot.pitch * axis
-    start = homogeneous(rotation(pivot.start).as_matrix(), np.array(pivot.start.position))
+    start = homogeneous(pivot.start.rotation.as_matrix(), np.array(pivot.start.position))
     return expm(screw * tilt) @ start
 
 
@@ -57,7 +57,7 @@ def quaternion(R):
 @given(pivots)
 def test_pose_at_zero_tilt_is_the_start(pivot):
     R, p = ScrewPath(pivot).pose(0.0)
-    np.testing.assert_allclose(R, rotation(pivot.start).as_matrix(), rtol=0, atol=ROUNDING)
+    np.testing.assert_allclose(R, pivot.start.rotation.as_matrix(), rtol=0, atol=ROUNDING)
     np.testing.assert_allclose(p, pivot.start.position, rtol=0, atol=ROUNDING)
 
 
@@ -201,7 +201,7 @@ def test_swing_about_an_axis_across_does_not_count_as_tilt(pivot, tilt, directio
     swing = Rotation.from_rotvec(angle * across)
     turn = Rotation.from_rotvec(tilt * path.direction)
     # The swing may come before or after the tilt.
-    moved = (turn * swing if before else swing * turn) * rotation(pivot.start)
+    moved = (turn * swing if before else swing * turn) * pivot.start.rotation
     # Near a half turn with much swing the twist is the angle of a short vector (cos 85 deg).
     found = path.tilt(moved.as_quat(scalar_first=True))
     assert found == pytest.approx(tilt, abs=100.0 * ROUNDING)
@@ -213,7 +213,7 @@ def test_a_small_oblique_turn_counts_by_its_share_about_the_axis(pivot, tilt, di
     path = ScrewPath(pivot)
     disturbance = angle * np.array(direction)
     turn = Rotation.from_rotvec(disturbance) * Rotation.from_rotvec(tilt * path.direction)
-    found = path.tilt((turn * rotation(pivot.start)).as_quat(scalar_first=True))
+    found = path.tilt((turn * pivot.start.rotation).as_quat(scalar_first=True))
     # What is left is of second order in the disturbance, of length sqrt(3) * angle at most.
     expected = tilt + disturbance @ path.direction
     assert found == pytest.approx(expected, abs=3.0 * angle**2 + 10.0 * ROUNDING)

@@ -116,7 +116,7 @@ def test_a_hand_may_go_to_another_face_if_it_is_allowed():
         ({"x": (0.1, 0.2)}, "freedom.x: got .* contains 0"),
         ({"turn_deg": (float("nan"), 0.0)}, "freedom.turn_deg"),
         ({"border": -0.01}, "freedom.border"),
-        ({"faces": {"middle": ()}}, "of left, right"),
+        ({"faces": {"middle": ()}}, "one of left, right"),
         ({"faces": {"left": ("top",)}}, r"one of \+x, -x"),
     ],
 )
@@ -181,10 +181,9 @@ def bowl(batch):
     return [float(np.square(x - 0.3).sum()) for x in batch]
 
 
-def sampled(seed, evaluations=160, numbers=3, seconds=60.0):
-    effort = Effort(evaluations, seconds, seed, workers=1)
-    sampler = _Sampler(np.full(numbers, 0.9), effort, seconds)
-    sampler._deadline = np.inf
+def sampled(seed, evaluations=160, numbers=3):
+    effort = Effort(evaluations, seed=seed, workers=1)
+    sampler = _Sampler(np.full(numbers, 0.9), effort, deadline=np.inf)
     sampler.run(bowl, lambda done, total, note: None)
     return sampler
 

@@ -161,7 +161,7 @@ def test_the_nominal_preset_draws_worlds_that_deviate_in_nothing():
     assert not world.pushes
 
 
-@pytest.mark.parametrize("uncertainty", [LAB, FIELD, HARSH])
+@pytest.mark.parametrize("uncertainty", [LAB, HARSH])  # field is harsh with other numbers
 def test_draws_fill_their_ranges_and_stay_within(uncertainty):
     u, worlds = uncertainty, [draw(uncertainty, BOX, seed) for seed in range(DRAWS)]
 
