@@ -12,7 +12,7 @@ from scipy.spatial.transform import Rotation
 
 from sim.collisions import distance
 from sim.meshes import read_mesh
-from sim.path import ObjectPath, object_path, rotation
+from sim.path import ObjectPath, object_path
 from sim.scenario import Geom, Scenario
 from sim.scene import ObjectMotion, compose
 from synthesis.contact import Array
@@ -275,7 +275,7 @@ def _planes(geom: Geom) -> Array:
             reach = np.linalg.norm(normals * size, axis=1)
         else:  # a sphere, or a capsule about a line
             reach = size[0] + np.abs(normals[:, 2]) * size[1:].sum()
-    R = rotation(geom.pose).as_matrix()
+    R = geom.pose.rotation.as_matrix()
     return _moved(np.column_stack([normals, -reach]), R, np.asarray(geom.pose.position))
 
 
