@@ -180,7 +180,7 @@ def bad_arguments(draw):
 
 
 @settings(
-    max_examples=300,
+    max_examples=100,
     derandomize=True,
     deadline=None,
     # The working folder is only read.
