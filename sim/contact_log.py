@@ -22,36 +22,51 @@ class ContactLog:
 
     Attributes:
         count: How many there are; rows from there on do not count.
-        step: Index of the step, (k,).
-        t: Time after the step [s], (k,).
         geoms: The two geoms, (k, 2).
         point: In the world [m], (k, 3).
         frame: Contact axes row by row, first the normal from the first geom to the second, (k, 9).
     """
 
     def __init__(self) -> None:
-        self.step, self.t = np.zeros(_ROOM, np.intp), np.zeros(_ROOM)
         self.geoms, self.point = np.zeros((_ROOM, 2), np.intp), np.zeros((_ROOM, 3))
         self.frame = np.zeros((_ROOM, 9))
-        # Constraint forces step by step: where those of a contact's step begin, where among them
-        # its own are (-1: it has none), and how many.
+        # Constraint forces step by step: where among those of its step a contact's own are (-1: it
+        # has none), and how many.
         self._forces = np.zeros(_ROOM)
-        self._begin, self._address, self._dim = np.zeros((3, _ROOM), np.intp)
+        self._address, self._dim = np.zeros((2, _ROOM), np.intp)
+        # Of each step its time, how many contacts it has, and where its forces begin.
+        self._t: list[float] = []
+        self._counts: list[int] = []
+        self._begin: list[int] = []
         self.clear()
 
     def clear(self) -> None:
         """Forgets all steps."""
         self.count = self._forces_count = 0
+        for numbers in (self._t, self._counts, self._begin):
+            numbers.clear()
 
-    def append(self, step: int, data: mujoco.MjData) -> None:
+    @property
+    def step(self) -> NDArray[np.intp]:
+        """Index of each contact's step, (count,)."""
+        return np.repeat(np.arange(len(self._counts)), self._counts)
+
+    @property
+    def t(self) -> Array:
+        """Time after each contact's step [s], (count,)."""
+        return np.repeat(self._t, self._counts)
+
+    def append(self, data: mujoco.MjData) -> None:
         """Keeps the contacts of the step that was just made."""
         contacts, forces = data.contact, data.efc_force
-        first, last = self.count, self.count + data.ncon
-        begin, end = self._forces_count, self._forces_count + len(forces)
-        while last > len(self.step) or end > len(self._forces):
+        count, begin = data.ncon, self._forces_count
+        first, last, end = self.count, self.count + count, begin + len(forces)
+        while last > len(self.geoms) or end > len(self._forces):
             self._grow()
         rows = slice(first, last)
-        self.step[rows], self.t[rows], self._begin[rows] = step, data.time, begin
+        self._t.append(data.time)
+        self._counts.append(count)
+        self._begin.append(begin)
         self.geoms[rows], self.point[rows] = contacts.geom, contacts.pos
         self.frame[rows], self._dim[rows] = contacts.frame, contacts.dim
         self._address[rows], self._forces[begin:end] = contacts.efc_address, forces
@@ -62,9 +77,8 @@ class ContactLog:
 
         As of mj_contactForce for elliptic cones, whose constraint forces are contact forces.
         """
-        begin, address, dim = (
-            column[: self.count, None] for column in (self._begin, self._address, self._dim)
-        )
+        address, dim = (column[: self.count, None] for column in (self._address, self._dim))
+        begin = np.repeat(self._begin, self._counts)[:, None]
         forces = self._forces.take(begin + address + _COMPONENTS, mode="clip")
         return np.where((address >= 0) & (dim > _COMPONENTS), forces, 0.0)
 
@@ -125,7 +139,7 @@ class ContactReader:
             Number of contacts that the scenario does not want, (s,); see ``collisions``.
         """
         rows = slice(0, log.count)
-        step, geoms, point = log.step[rows], log.geoms[rows], log.point[rows]
+        step, geoms, point = log.step, log.geoms[rows], log.point[rows]
         contact = self._contact(step, geoms, point, p_WO, R_WO)
         ours = contact >= 0
         where = step[ours], contact[ours]
@@ -139,7 +153,7 @@ class ContactReader:
             sums = np.bincount(place, component, minlength=wrenches[..., i].size)
             wrenches[..., i] = sums.reshape(wrenches.shape[:2])
         positions[where] = point[ours]
-        return self._count_collisions(step, geoms, log.t[rows], len(p_WO))
+        return self._count_collisions(step, geoms, log.t, len(p_WO))
 
     def _contact(
         self, step: NDArray, geoms: NDArray, point: Array, p_WO: Array, R_WO: Array

@@ -99,16 +99,28 @@ class Plant:
         self.physics = dm_mujoco.Physics.from_model(wrapper.MjModel(compose(scenario).compile()))
         self.physics.legacy_step = False  # else new contacts would be read with old forces
         self._model, self._data = self.physics.model.ptr, self.physics.data.ptr
-        self._warnings = self._data.warning.number  # a view
+        data = self._data
+        # Views of what MuJoCo writes, which are slow to ask for one by one.
+        self._warnings, self._ctrl = data.warning.number, data.ctrl
+        self._numbers = data.qpos, data.qvel, data.actuator_force
         model = self._model
         world.change(scenario, model)
         joints = [int(model.actuator(i).trnid[0]) for i in range(model.nu)]
         self.joints = tuple(model.joint(j).name for j in joints)
         self._q = model.jnt_qposadr[joints].copy()
-        self._qd = model.jnt_dofadr[joints].copy()
         thing = model.body(scenario.object.name)
         free = model.joint(scenario.object.name)
-        self._pose = slice(int(free.qposadr[0]), int(free.qposadr[0]) + 7)
+        # Where angles, speeds, the object's pose and torques are among the numbers, end to end.
+        self._measured = np.concatenate(
+            [
+                self._q,
+                model.nq + model.jnt_dofadr[joints],
+                int(free.qposadr[0]) + np.arange(7),
+                model.nq + model.nv + np.arange(model.nu),
+            ]
+        )
+        ends = np.cumsum([0, len(joints), len(joints), 3, 4, model.nu]).tolist()
+        self._parts = tuple(map(slice, ends[:-1], ends[1:]))
         self._object = thing.id
         self._contacts, self._reader = ContactLog(), ContactReader(scenario, model)
         self._motion = MotionLog(scenario, model, self._data)
@@ -133,7 +145,7 @@ class Plant:
 
     def apply(self, tau: Array) -> None:
         """Commands the motor torques [N·m or N], (l,), for the next step; the motors saturate."""
-        self._data.ctrl[:] = self._motors.torques(self._data.time, tau)
+        self._ctrl[:] = self._motors.torques(self._data.time, tau)
 
     def step(self) -> None:
         """One physics step.
@@ -166,16 +178,10 @@ class Plant:
 
     def measure(self) -> Measurement:
         """The present state."""
-        data = self._data
-        qpos = data.qpos
-        pose = qpos[self._pose].copy()
+        numbers = np.concatenate(self._numbers).take(self._measured)
+        q, qd, p_WO, quat_WO, tau = self._parts
         return Measurement(
-            t=data.time,
-            q=qpos.take(self._q),
-            qd=data.qvel.take(self._qd),
-            p_WO=pose[:3],
-            quat_WO=pose[3:],
-            tau=data.actuator_force.copy(),
+            self._data.time, numbers[q], numbers[qd], numbers[p_WO], numbers[quat_WO], numbers[tau]
         )
 
     def tips(self, positions: Array, quaternions: Array, twists: Array) -> None:
@@ -191,7 +197,7 @@ class Plant:
     def contacts(self, positions: Array, wrenches: Array) -> int:
         """Adds up the plant's contacts; see :meth:`ContactReader.read`, here of one step."""
         self._contacts.clear()
-        self._contacts.append(0, self._data)
+        self._contacts.append(self._data)
         R_WO = self._data.xmat[self._object].reshape(1, 3, 3)
         collisions = self._reader.read(
             self._contacts,
@@ -204,7 +210,7 @@ class Plant:
 
     def log(self, step: int) -> None:
         """Keeps the last step, of an index in a block of steps, to be read with the block."""
-        self._contacts.append(step, self._data)
+        self._contacts.append(self._data)
         self._motion.append(step)
 
     def read(self, block: Trace) -> None:

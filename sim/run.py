@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import contextlib
 import dataclasses
+import gc
 import signal
 import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from importlib.metadata import version
 from pathlib import Path
 from types import FrameType
@@ -139,7 +141,8 @@ def execute(
     histories: list[ContactHistory] = []
     error: str | None = None
     viewer_url = open_viewer() if request.live and out is not None else None
-    with _StopSignal() as stop:  # from the first file to the last, so that none is missing
+    # From the first file to the last, so that none is missing.
+    with _quick_collections(), _StopSignal() as stop:
         if out is not None:
             out.mkdir(parents=True, exist_ok=True)
             config = resolved_config(request)
@@ -186,6 +189,16 @@ def execute(
             write_json(out / REPORT, dataclasses.asdict(report))
             recorder.close(report_markdown(report))
     return Result(report, trace, history, error)
+
+
+@contextlib.contextmanager
+def _quick_collections() -> Iterator[None]:
+    """Keeps the garbage collector from what is older than a run, which takes it 80 ms to search."""
+    gc.freeze()
+    try:
+        yield
+    finally:
+        gc.unfreeze()
 
 
 class _StopSignal:
