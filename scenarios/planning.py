@@ -120,6 +120,7 @@ class Plan(Chosen):
 def _print(console: Console, planned: Planned) -> None:
     import numpy as np
     from rich.box import SIMPLE
+    from rich.markup import escape
     from rich.table import Table
 
     from sim.plan_file import stretches
@@ -144,11 +145,11 @@ def _print(console: Console, planned: Planned) -> None:
         f"{max(residuals.dual, residuals.gap):.1e}",
         soft_wrap=True,
     )
-    table = Table("tilt [deg]", "limits used up", box=SIMPLE)
+    table = Table(escape("tilt [deg]"), "limits used up", box=SIMPLE)
     for low, high, limits in stretches(planned):
         table.add_row(f"{low:.1f} to {high:.1f}", ", ".join(limits) or "none")
     console.print(table)
-    table = Table("limit", "used at most [%]", "at [deg]", box=SIMPLE)
+    table = Table("limit", "used at most [%]", escape("at [deg]"), box=SIMPLE)
     places = np.degrees(planned.tilt[found.problem.stations[:, 0]])
     for name, share in sorted(found.shares.items(), key=lambda item: -item[1].max()):
         if share.max() >= _LISTED:
