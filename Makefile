@@ -36,8 +36,8 @@ format: $(STAMP)
 # Rewrites the MJCF files that are made from data: the robot from its URDF, the scenes and the
 # schema from scenarios.
 assets: $(STAMP)
-	$(BIN)/python -m assets.from_urdf
-	$(BIN)/python -m scenarios.scene_files
+	$(BIN)/python -m fulcrum.assets.from_urdf
+	$(BIN)/python -m fulcrum.scenarios.scene_files
 
 $(STAMP): pyproject.toml constraints.txt
 	$(PYTHON) -m venv .venv

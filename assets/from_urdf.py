@@ -1,4 +1,4 @@
-"""Makes the robots that ship from their official URDFs: `python -m assets.from_urdf`."""
+"""Makes the robots that ship from their official URDFs: `python -m fulcrum.assets.from_urdf`."""
 
 from __future__ import annotations
 
@@ -6,14 +6,14 @@ from dataclasses import dataclass, field
 from importlib.metadata import version
 from pathlib import Path
 
-from assets import DESCRIPTIONS, ROBOTS, description_path
-from assets.urdf import mjcf_of, text, without_branches
+from fulcrum.assets import DESCRIPTIONS, ROBOTS, description_path
+from fulcrum.assets.urdf import mjcf_of, text, without_branches
 
 GRIPPER_JOINTS = ("left_gripper_base_joint", "right_gripper_base_joint")
 HEADER = """\
 <!-- {title}, from {path}
      of {wheel} {version} ({licence}).
-     Made by `python -m assets.from_urdf`: do not edit.
+     Made by `python -m fulcrum.assets.from_urdf`: do not edit.
      A joint's `user` number is its speed limit [rad/s]. -->
 """
 

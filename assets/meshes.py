@@ -10,7 +10,7 @@ import trimesh
 from numpy.typing import NDArray
 from trimesh.visual import TextureVisuals
 
-from assets.packages import ModelError
+from fulcrum.assets.packages import ModelError
 
 FACES_PER_MESH = 7_000
 """Triangle goal for one mesh file, missed where open borders are long; the pedestal had 74,707."""

@@ -11,7 +11,7 @@ from collections.abc import Iterable, Iterator
 import mujoco
 import numpy as np
 
-from assets.packages import ModelError
+from fulcrum.assets.packages import ModelError
 
 LOOKS = 2
 """Group of geoms that are there to be looked at only, as is the custom in MJCF."""

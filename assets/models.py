@@ -12,17 +12,17 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from assets import HANDS, ROBOTS, asset_path, description_path
-from assets.cache import cached
-from assets.mjcf import tidy
-from assets.packages import ModelError, check_files, named_file, read_xml
+from fulcrum.assets import HANDS, ROBOTS, asset_path, description_path
+from fulcrum.assets.cache import cached
+from fulcrum.assets.mjcf import tidy
+from fulcrum.assets.packages import ModelError, check_files, named_file, read_xml
 
 # What turns a URDF into MJCF: with another version of any of them the cache does not count.
 _CONVERTERS = ("mujoco", "numpy", "pycollada", "trimesh")
 
 
 def robot_spec(model: str) -> mujoco.MjSpec:
-    """A robot alone, with a motor at each joint; see `assets.mjcf.tidy`.
+    """A robot alone, with a motor at each joint; see `fulcrum.assets.mjcf.tidy`.
 
     Args:
         model: Name of a robot that ships, or path of a URDF or MJCF file.
@@ -98,7 +98,7 @@ def _urdf(path: Path) -> mujoco.MjSpec:
     determined_by += [file.read_bytes() for file in converters]
 
     def make() -> list[NDArray]:
-        from assets.urdf import mjcf_of, text  # trimesh takes a third of a second to import
+        from fulcrum.assets.urdf import mjcf_of, text
 
         try:
             return [np.frombuffer(text(mjcf_of(urdf, path)).encode(), np.uint8)]

@@ -19,9 +19,9 @@ import trimesh
 from numpy.typing import NDArray
 from trimesh.intersections import slice_faces_plane
 
-from assets.meshes import UNPAINTED, read_mesh
-from assets.packages import ModelError, named_file
-from assets.visuals import named_colors, pose_of, rgba_of, scale_of
+from fulcrum.assets.meshes import UNPAINTED, read_mesh
+from fulcrum.assets.packages import ModelError, named_file
+from fulcrum.assets.visuals import named_colors, pose_of, rgba_of, scale_of
 
 PLACEHOLDER = 0.001
 """Spheres of this radius [m] stand in URDFs where a link has no real collision shape."""

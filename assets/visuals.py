@@ -14,8 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from assets.cache import cached
-from assets.packages import named_file
+from fulcrum.assets.cache import cached
+from fulcrum.assets.packages import named_file
 
 # What turns a mesh file into arrays: with another version of any of them the cache does not count.
 _MESH_READERS = ("fast-simplification", "pycollada", "trimesh")
@@ -54,7 +54,7 @@ def load_visuals(
     """Visual meshes of all links that have one, in the order of the URDF.
 
     Args:
-        urdf: Text of the URDF, such as `assets.from_urdf.urdf_of("baxter")` returns.
+        urdf: Text of the URDF, such as `fulcrum.assets.from_urdf.urdf_of("baxter")` returns.
         description: Its file, from which the mesh files are found.
         links: Names of the links that are wanted; None for all.
 
@@ -136,7 +136,7 @@ def _light_mesh(
     ]
 
     def make() -> list[NDArray]:
-        from assets.meshes import light_mesh  # trimesh takes a third of a second to import
+        from fulcrum.assets.meshes import light_mesh
 
         return light_mesh(file, scale, fallback)
 

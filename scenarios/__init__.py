@@ -7,13 +7,13 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from sim.scenario import Scenario
+    from fulcrum.sim.scenario.scenario import Scenario
 
 
 @cache
 def scenarios() -> dict[str, Scenario]:
     """All scenarios that ship, by name."""
-    from scenarios.file import read, scene_files
+    from fulcrum.scenarios.reading.file import read, scene_files
 
     return {name: read(file) for name, file in scene_files().items()}
 
@@ -28,8 +28,8 @@ def scenario(name_or_file: str, allowed: tuple[Path, ...] = ()) -> Scenario:
     Raises:
         InvalidInputError: There is none of that name, or the file is not valid.
     """
-    from scenarios.file import named_file, read
-    from scenarios.file_scene import check_scene
+    from fulcrum.scenarios.reading.file import named_file, read
+    from fulcrum.scenarios.reading.scene import check_scene
 
     known = scenarios()
     if name_or_file in known:

@@ -5,13 +5,13 @@ from __future__ import annotations
 import json
 from pathlib import Path
 
-import assets
-from scenarios import scenarios
-from scenarios.file import SCHEMA, schema
-from sim.ik import plan_joints
-from sim.plant import Plant
-from sim.scenario import Scenario
-from sim.scene import compose
+from fulcrum import assets
+from fulcrum.scenarios import scenarios
+from fulcrum.scenarios.reading.file import SCHEMA, schema
+from fulcrum.sim.model.scene import compose
+from fulcrum.sim.motion.ik import plan_joints
+from fulcrum.sim.plant.mujoco import Plant
+from fulcrum.sim.scenario.scenario import Scenario
 
 
 def scene_xml(scenario: Scenario) -> str:

@@ -1,1 +1,1 @@
-"""The plant and the loop: scene, inverse kinematics, controller, monitor, verdict, recording."""
+"""The closed loop and all around it: scene, models, plant, control, judgement, recording."""

@@ -1,17 +1,17 @@
 """Contact force synthesis: arrays in, contact forces and joint torques out; knows no simulator."""
 
-from synthesis.contact import Contact, ContactModel, Role
-from synthesis.errors import (
-    FulcrumError,
+from fulcrum.synthesis.contact import Contact, ContactModel, Role
+from fulcrum.synthesis.errors import FulcrumError, InvalidInputError, SolverError, UnboundedError
+from fulcrum.synthesis.problem import Joints, Objective, Problem
+from fulcrum.synthesis.robust.certificate import RobustInfeasibleError
+from fulcrum.synthesis.solution import (
+    Certificate,
     InfeasibleError,
-    InvalidInputError,
-    RobustInfeasibleError,
-    SolverError,
-    UnboundedError,
+    Multipliers,
+    Residuals,
+    Solution,
 )
-from synthesis.problem import Joints, Objective, Problem
-from synthesis.solution import Certificate, Multipliers, Residuals, Solution
-from synthesis.synthesizer import Synthesizer
+from fulcrum.synthesis.synthesizer import Synthesizer
 
 __all__ = [
     "Certificate",

@@ -17,12 +17,12 @@ import clarabel
 import numpy as np
 import scipy.sparse as sp
 
-from synthesis.conic import ConicForm
-from synthesis.contact import Array
-from synthesis.errors import InfeasibleError, SolverError
-from synthesis.problem import Objective, Problem
-from synthesis.solution import certificate
-from synthesis.solver import SOLVED, fallback_settings, solver_settings
+from fulcrum.synthesis.arrays import Array
+from fulcrum.synthesis.conic import ConicForm
+from fulcrum.synthesis.errors import SolverError
+from fulcrum.synthesis.problem import Objective, Problem
+from fulcrum.synthesis.solution import InfeasibleError, certificate
+from fulcrum.synthesis.solver import SOLVED, fallback_settings, solver_settings
 
 _GRIP_WEIGHT = 1e-4
 

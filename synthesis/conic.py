@@ -40,9 +40,9 @@ import clarabel
 import numpy as np
 from numpy.typing import NDArray
 
-from synthesis.contact import Array, N
-from synthesis.problem import Objective, Problem
-from synthesis.solution import Multipliers
+from fulcrum.synthesis.arrays import Array, N
+from fulcrum.synthesis.problem import Objective, Problem
+from fulcrum.synthesis.solution import Multipliers
 
 _LINEAR_IN_TORQUE = (Objective.MAX_TORQUE, Objective.MAX_TORQUE_UTILISATION)
 

@@ -9,15 +9,9 @@ from enum import StrEnum
 from functools import cached_property, lru_cache
 
 import numpy as np
-from numpy.typing import NDArray
 
-from synthesis.errors import InvalidInputError
-
-Array = NDArray[np.float64]
-Mask = NDArray[np.bool_]
-
-# Positions of the components in a contact wrench (f_t, f_o, f_n, m_t, m_o, m_n).
-T, O, N, M_N = 0, 1, 2, 5
+from fulcrum.synthesis.arrays import M_N, Array, N, O, T
+from fulcrum.synthesis.errors import InvalidInputError
 
 
 class ContactModel(StrEnum):

@@ -6,12 +6,13 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from synthesis.contact import M_N, ContactModel, N, O, T
-from synthesis.markdown import escaped, number, numbers, page, table
+from fulcrum.synthesis.arrays import M_N, N, O, T
+from fulcrum.synthesis.contact import ContactModel
+from fulcrum.synthesis.markdown import escaped, number, numbers, page, table
 
 if TYPE_CHECKING:
-    from synthesis.problem import Problem
-    from synthesis.solution import Certificate, Solution
+    from fulcrum.synthesis.problem import Problem
+    from fulcrum.synthesis.solution import Certificate, Solution
 
 # How many joints and constraints a table names.
 _NAMED = 6

@@ -9,8 +9,9 @@ from operator import le
 
 import numpy as np
 
-from synthesis.contact import Array, Contact, ContactModel, ContactSet, check_names, grasp_maps
-from synthesis.errors import InvalidInputError
+from fulcrum.synthesis.arrays import Array
+from fulcrum.synthesis.contact import Contact, ContactModel, ContactSet, check_names, grasp_maps
+from fulcrum.synthesis.errors import InvalidInputError
 
 # Rotation matrices come from integrated quaternions: 1e-6 passes those, and nothing mis-scaled.
 _ROTATION_TOLERANCE = 1e-6
@@ -210,7 +211,7 @@ class Problem:
         return w_OC_C[self.contact_set.hand_rows].ravel().dot(J) + self.joints.tau_g
 
     def _repr_markdown_(self) -> str:
-        from synthesis.notebook import problem_markdown
+        from fulcrum.synthesis.notebook import problem_markdown
 
         return problem_markdown(self)
 
@@ -228,3 +229,24 @@ def _check_finite(name: str, array: Array) -> float:
     if not math.isfinite(squares) and not np.isfinite(array).all():
         raise InvalidInputError(name, "a value that is NaN or infinite", "finite numbers")
     return squares
+
+
+@dataclass(frozen=True, eq=False)
+class Gravity:
+    """The object's weight; the external wrench may hold more than it.
+
+    Attributes:
+        weight: [N].
+        direction_O: Unit vector along which it pulls, in the object's axes, (3,).
+        center_O: Centre of mass in the object frame [m], (3,).
+    """
+
+    weight: float
+    direction_O: Array
+    center_O: Array
+
+    @property
+    def wrench_O(self) -> Array:
+        """The weight's wrench in the object frame [N, N·m], (6,)."""
+        force = self.weight * self.direction_O
+        return np.concatenate([force, np.cross(self.center_O, force)])

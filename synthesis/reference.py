@@ -17,9 +17,10 @@ from dataclasses import dataclass
 import cvxpy as cp
 import numpy as np
 
-from synthesis.contact import Array, ContactModel, Role
-from synthesis.errors import FulcrumError, SolverError, UnboundedError
-from synthesis.problem import Objective, Problem
+from fulcrum.synthesis.arrays import Array
+from fulcrum.synthesis.contact import ContactModel, Role
+from fulcrum.synthesis.errors import FulcrumError, SolverError, UnboundedError
+from fulcrum.synthesis.problem import Objective, Problem
 
 # The first that physical variables can be solved to counts; the loosest is a hundredth of the
 # deviation that the tests allow.

@@ -19,8 +19,10 @@ from functools import cached_property
 
 import numpy as np
 
-from synthesis.contact import Array, ContactModel, N, utilisation
-from synthesis.problem import Objective, Problem
+from fulcrum.synthesis.arrays import Array, N
+from fulcrum.synthesis.contact import ContactModel, utilisation
+from fulcrum.synthesis.errors import FulcrumError
+from fulcrum.synthesis.problem import Objective, Problem
 
 
 @dataclass(frozen=True, eq=False)
@@ -211,7 +213,7 @@ class Solution:
         return abs(self.value - dual)
 
     def _repr_markdown_(self) -> str:
-        from synthesis.notebook import solution_markdown
+        from fulcrum.synthesis.notebook import solution_markdown
 
         return solution_markdown(self)
 
@@ -255,7 +257,7 @@ class Certificate:
         return sorted((n for n in weights if weights[n] > 0.0), key=lambda n: -weights[n])[:count]
 
     def _repr_markdown_(self) -> str:
-        from synthesis.notebook import certificate_markdown
+        from fulcrum.synthesis.notebook import certificate_markdown
 
         return certificate_markdown(self)
 
@@ -275,3 +277,14 @@ def shrink_cones(problem: Problem, factor: float) -> Problem:
         for c in problem.contacts
     )
     return replace(problem, contacts=contacts)
+
+
+class InfeasibleError(FulcrumError):
+    """No contact forces satisfy all constraints of (17); carries the Farkas certificate."""
+
+    def __init__(self, certificate: Certificate) -> None:
+        self.certificate = certificate
+        super().__init__(
+            "no contact forces keep the object in equilibrium within all limits; "
+            f"most binding: {', '.join(certificate.heaviest(3))}."
+        )

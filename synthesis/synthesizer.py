@@ -37,12 +37,13 @@ import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
 
-from synthesis.conic import ConicForm, structure
-from synthesis.contact import Array, ContactModel, N
-from synthesis.errors import InfeasibleError, SolverError, UnboundedError
-from synthesis.problem import Joints, Objective, Problem
-from synthesis.solution import Multipliers, Solution, certificate
-from synthesis.solver import SOLVED, fallback_settings, solver_settings
+from fulcrum.synthesis.arrays import Array, N
+from fulcrum.synthesis.conic import ConicForm, structure
+from fulcrum.synthesis.contact import ContactModel
+from fulcrum.synthesis.errors import SolverError, UnboundedError
+from fulcrum.synthesis.problem import Joints, Objective, Problem
+from fulcrum.synthesis.solution import InfeasibleError, Multipliers, Solution, certificate
+from fulcrum.synthesis.solver import SOLVED, fallback_settings, solver_settings
 
 _MARGIN_TOLERANCE = 1e-9
 _MARGIN_SOLVES = 50

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-ROOT = Path(__file__).parent.parent
+ROOT = Path(__file__).parents[1]
 PACKAGES = ("assets", "scenarios", "sim", "synthesis")
 # What each package may import of the others; the way of the data is scenarios -> sim -> synthesis.
 ALLOWED = {
@@ -24,6 +24,7 @@ API_WORDS = re.compile(
     r"|\bBox(?=\(|:$)",
     re.MULTILINE,
 )
+TESTS = sorted((ROOT / "tests").rglob("*.py"))
 FILES = sorted(path for package in PACKAGES for path in (ROOT / package).rglob("*.py"))
 
 
@@ -44,7 +45,13 @@ def imported(source):
 
 
 def packages_imported(source):
-    return {module.split(".")[0] for module in imported(source)}
+    """First names of what a source imports; of the house's own modules the package."""
+    found = set()
+    for module in imported(source):
+        parts = module.split(".")
+        own = parts[0] == "fulcrum" and len(parts) > 1 and parts[1] in PACKAGES
+        found.add(parts[1] if own else parts[0])
+    return found
 
 
 def against_the_arrows(path, source):
@@ -52,6 +59,11 @@ def against_the_arrows(path, source):
     own = path.split("/")[0]
     found = packages_imported(source)
     return (found & set(PACKAGES)) - ALLOWED[own] - {own} | (found & {""})
+
+
+def bare_names(source):
+    """Packages of the house that a source imports by their bare names: that doubles every class."""
+    return {module.split(".")[0] for module in imported(source)} & set(PACKAGES)
 
 
 def steps_taken(source):
@@ -91,16 +103,28 @@ def test_imports_run_one_way(path):
 @pytest.mark.parametrize(
     ("path", "source", "caught"),
     [
-        ("sim/loop.py", "from scenarios import scenario", {"scenarios"}),
-        ("synthesis/conic.py", "def f():\n    import sim.plant", {"sim"}),
-        ("assets/visuals.py", "from synthesis.errors import FulcrumError", {"synthesis"}),
-        ("sim/loop.py", "from ..scenarios import scenario", {""}),
-        ("scenarios/cli.py", "from sim.run import execute", set()),
-        ("sim/ik.py", "from sim.path import ScrewPath\nimport assets", set()),
+        ("sim/run/loop.py", "from fulcrum.scenarios import scenario", {"scenarios"}),
+        ("synthesis/conic.py", "def f():\n    import fulcrum.sim.plant.mujoco", {"sim"}),
+        ("assets/visuals.py", "from fulcrum.synthesis.errors import FulcrumError", {"synthesis"}),
+        ("sim/run/loop.py", "from ..scenarios import scenario", {""}),
+        ("scenarios/cli.py", "from fulcrum.sim.run.execute import execute", set()),
+        ("sim/motion/ik.py", "from fulcrum.sim.model import scene\nimport fulcrum.assets", set()),
     ],
 )
 def test_imports_against_the_arrows_are_caught(path, source, caught):
     assert against_the_arrows(path, source) == caught
+
+
+@pytest.mark.parametrize("path", [*FILES, *TESTS], ids=name)
+def test_all_imports_go_through_the_one_package(path):
+    assert bare_names(path.read_text()) == set()
+
+
+@pytest.mark.parametrize(
+    "source", ["import sim.run", "def f():\n    from synthesis import Problem"]
+)
+def test_a_bare_name_is_caught(source):
+    assert bare_names(source)
 
 
 def test_only_the_recording_imports_rerun():
@@ -121,7 +145,7 @@ def test_an_import_inside_a_function_or_of_a_part_is_caught():
 
 
 def test_only_the_plant_steps_mujoco():
-    assert {name(p) for p in FILES if steps_taken(p.read_text())} == {"sim/plant.py"}
+    assert {name(p) for p in FILES if steps_taken(p.read_text())} == {"sim/plant/mujoco.py"}
 
 
 @pytest.mark.parametrize(
@@ -170,11 +194,9 @@ def test_a_module_without_docstring_is_caught():
 
 
 def test_files_have_at_most_350_lines():
-    files = [*FILES, *(ROOT / "tests").glob("*.py")]
-    lengths = {name(path): len(path.read_text().splitlines()) for path in files}
+    lengths = {name(path): len(path.read_text().splitlines()) for path in [*FILES, *TESTS]}
     assert {path: n for path, n in lengths.items() if n > MAX_LINES} == {}
 
 
-def test_every_package_is_typed():
-    for package in PACKAGES:
-        assert (ROOT / package / "py.typed").is_file(), package
+def test_the_package_is_typed():
+    assert (ROOT / "src" / "fulcrum" / "py.typed").is_file()

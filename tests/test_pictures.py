@@ -11,13 +11,13 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from scenarios import scenario
-from sim.recording.viewer import screenshot
-from sim.run import Request, execute
-from sim.settings import Phase
-from synthesis import InvalidInputError
+from fulcrum.scenarios import scenario
+from fulcrum.sim.recording.viewer import screenshot
+from fulcrum.sim.run.execute import Request, execute
+from fulcrum.sim.scenario.phases import Phase
+from fulcrum.synthesis import InvalidInputError
 
-ROOT = Path(__file__).parent.parent
+ROOT = Path(__file__).parents[1]
 # A third of the box's tilt, from hands that are near: 3.2 s.
 PHASES = (
     Phase("touch", 0.2, tilt=0.0, gap=0.0, grip=0.0),
@@ -102,7 +102,7 @@ def test_a_machine_without_vulkan_is_told_what_to_install(recording, tmp_path):
     out = tmp_path / "x.png"
     arguments = ["screenshot", str(recording), "--at", "1", "--out", str(out)]
     done = subprocess.run(
-        [sys.executable, "-m", "scenarios.cli", *arguments],
+        [sys.executable, "-m", "fulcrum.scenarios.cli", *arguments],
         check=False,
         cwd=ROOT,
         env={**os.environ, **nothing},

@@ -15,9 +15,9 @@ from mkdocs.exceptions import PluginError
 from mkdocs.structure.files import File, Files
 from schema import reference
 
-from scenarios import scenarios
-from scenarios.cli import Command, main
-from scenarios.file import schema
+from fulcrum.scenarios import scenarios
+from fulcrum.scenarios.cli import Command, main
+from fulcrum.scenarios.reading.file import schema
 
 _ROOT = Path(__file__).parent.parent.parent
 _FILES = """# Scenario files

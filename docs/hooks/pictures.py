@@ -10,14 +10,15 @@ import mujoco
 import numpy as np
 from PIL import Image
 
-from assets.models import looks_of
-from assets.visuals import Visual, link_names, load_visuals
-from scenarios import scenarios
-from sim.ik import JointPath, plan_joints
-from sim.path import ObjectPath, object_path
-from sim.robot import RobotModel
-from sim.scenario import Scenario
-from sim.scene import ObjectMotion, compose
+from fulcrum.assets.models import looks_of
+from fulcrum.assets.visuals import Visual, link_names, load_visuals
+from fulcrum.scenarios import scenarios
+from fulcrum.sim.model.object_path import ObjectPath, object_path
+from fulcrum.sim.model.robot import RobotModel
+from fulcrum.sim.model.scene import ObjectMotion, compose
+from fulcrum.sim.motion.ik import plan_joints
+from fulcrum.sim.motion.joint_path import JointPath
+from fulcrum.sim.scenario.scenario import Scenario
 
 _WIDTH, _HEIGHT = 480, 420
 _SHARES = (0.0, 0.5, 1.0)  # of the tilt

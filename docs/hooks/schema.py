@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import Any, NamedTuple
 
-from synthesis.markdown import table
+from fulcrum.synthesis.markdown import table
 
 Schema = dict[str, Any]
 _NAME = "NAME"  # in the header of tables that have names of one's own

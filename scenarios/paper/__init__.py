@@ -1,1 +1,1 @@
-"""The paper's figures and numbers, reproduced."""
+"""The paper's cases, figures and statements, beside what is computed and measured here."""

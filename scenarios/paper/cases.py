@@ -7,11 +7,12 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from scenarios import scenario
-from sim.poses import PathProblems
-from sim.scenario import Pivot, Scenario
-from synthesis import InfeasibleError, Objective, Solution, Synthesizer
-from synthesis.contact import Array, N
+from fulcrum.scenarios import scenario
+from fulcrum.sim.planning.path_problems import PathProblems
+from fulcrum.sim.scenario.path import Pivot
+from fulcrum.sim.scenario.scenario import Scenario
+from fulcrum.synthesis import InfeasibleError, Objective, Solution, Synthesizer
+from fulcrum.synthesis.arrays import Array, N
 
 FORCE_OBJECTIVES = {
     "GFOP max": Objective.MAX_NORMAL_FORCE,

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import matplotlib as mpl
 
-from synthesis.contact import Array
+from fulcrum.synthesis.arrays import Array
 
 mpl.use("Agg")
 from matplotlib import pyplot as plt

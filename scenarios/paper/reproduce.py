@@ -9,8 +9,8 @@ from pathlib import Path
 
 import numpy as np
 
-from scenarios import scenario
-from scenarios.paper.cases import (
+from fulcrum.scenarios import scenario
+from fulcrum.scenarios.paper.cases import (
     FORCE_OBJECTIVES,
     PAPER_TILT_DEG,
     TORQUE_OBJECTIVES,
@@ -18,16 +18,16 @@ from scenarios.paper.cases import (
     paper_cylinder,
     sweep,
 )
-from scenarios.paper.figures import Curve, Figure, draw
-from scenarios.paper.statements import Statement, all_statements
-from sim.files import write_json
-from sim.poses import PathProblems
-from sim.report import Verdict
-from sim.run import Request, execute
-from sim.scenario import Scenario
-from sim.settings import controllers
-from synthesis import Objective
-from synthesis.contact import N
+from fulcrum.scenarios.paper.figures import Curve, Figure, draw
+from fulcrum.scenarios.paper.statements import Statement, all_statements
+from fulcrum.sim.evaluation.report import Verdict
+from fulcrum.sim.planning.path_problems import PathProblems
+from fulcrum.sim.run.execute import Request, execute
+from fulcrum.sim.run.files import write_json
+from fulcrum.sim.scenario.control import controllers
+from fulcrum.sim.scenario.scenario import Scenario
+from fulcrum.synthesis import Objective
+from fulcrum.synthesis.arrays import N
 
 Step = Callable[[str], None]
 STEPS = 7

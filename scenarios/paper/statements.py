@@ -6,13 +6,14 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from scenarios import scenario
-from scenarios.paper.cases import Sweep, paper_box, paper_cylinder
-from sim.poses import PathProblems
-from sim.scenario import Friction, Scenario, lifted
-from sim.settings import controllers
-from synthesis import InfeasibleError, Problem, Synthesizer
-from synthesis.reference import solve_reference
+from fulcrum.scenarios import scenario
+from fulcrum.scenarios.paper.cases import Sweep, paper_box, paper_cylinder
+from fulcrum.sim.planning.path_problems import PathProblems
+from fulcrum.sim.scenario.contacts import Friction
+from fulcrum.sim.scenario.control import controllers
+from fulcrum.sim.scenario.scenario import Scenario, lifted
+from fulcrum.synthesis import InfeasibleError, Problem, Synthesizer
+from fulcrum.synthesis.reference import solve_reference
 
 
 @dataclass(frozen=True)

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import rerun.blueprint as rrb
 
-from sim.scenario import Scenario
-from synthesis.contact import Array
+from fulcrum.sim.scenario.scenario import Scenario
+from fulcrum.synthesis.arrays import Array
 
 TIMELINE = "time"
 _BACKGROUND = (222, 226, 232)

@@ -6,7 +6,7 @@ import numpy as np
 import rerun as rr
 from rerun import components
 
-from synthesis.contact import Array
+from fulcrum.synthesis.arrays import Array
 
 _SCALARS = rr.Scalars.descriptor_scalars()
 _TRANSLATION = rr.Transform3D.descriptor_translation()

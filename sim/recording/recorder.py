@@ -11,17 +11,17 @@ import numpy as np
 import rerun as rr
 from rerun.components import AggregationPolicy
 
-from sim.contacts import true_contacts
-from sim.guard import Mode
-from sim.monitor import ContactHistory
-from sim.path import object_path
-from sim.plan import Plan
-from sim.recording.blueprint import TIMELINE, blueprint
-from sim.recording.columns import arrows, scalars, strips
-from sim.recording.scenery import Scenery
-from sim.scenario import Scenario
-from sim.trace import Trace, torque_shares
-from synthesis.contact import Array, N
+from fulcrum.sim.evaluation.monitor import ContactHistory
+from fulcrum.sim.model.contacts import true_contacts
+from fulcrum.sim.model.object_path import object_path
+from fulcrum.sim.planning.plan import Plan
+from fulcrum.sim.recording.blueprint import TIMELINE, blueprint
+from fulcrum.sim.recording.columns import arrows, scalars, strips
+from fulcrum.sim.recording.scenery import Scenery
+from fulcrum.sim.scenario.scenario import Scenario
+from fulcrum.sim.signals.event import Mode
+from fulcrum.sim.signals.trace import Trace, torque_shares
+from fulcrum.synthesis.arrays import Array, N
 
 
 class _Look(NamedTuple):

@@ -10,15 +10,16 @@ import numpy as np
 import rerun as rr
 from scipy.spatial.transform import Rotation
 
-from assets.mjcf import LOOKS
-from assets.models import looks_of
-from assets.visuals import Visual, link_names, load_visuals
-from sim.recording.blueprint import TIMELINE
-from sim.recording.columns import poses
-from sim.scenario import Robot, Scenario
-from sim.scene import ObjectMotion, compose, hand_body
-from sim.trace import Trace
-from synthesis.contact import Array
+from fulcrum.assets.mjcf import LOOKS
+from fulcrum.assets.models import looks_of
+from fulcrum.assets.visuals import Visual, link_names, load_visuals
+from fulcrum.sim.model.scene import ObjectMotion, compose, hand_body
+from fulcrum.sim.recording.blueprint import TIMELINE
+from fulcrum.sim.recording.columns import poses
+from fulcrum.sim.scenario.robot import Robot
+from fulcrum.sim.scenario.scenario import Scenario
+from fulcrum.sim.signals.trace import Trace
+from fulcrum.synthesis.arrays import Array
 
 WORLD = "world"
 _POSES = f"{WORLD}/poses"  # one entity holds those of all bodies, whose frames its rows name

@@ -14,9 +14,9 @@ from pathlib import Path
 
 from rerun.experimental import ViewerClient
 
-from sim.recording.blueprint import TIMELINE
-from sim.recording.cut import MAGIC, readable
-from synthesis import FulcrumError, InvalidInputError
+from fulcrum.sim.recording.blueprint import TIMELINE
+from fulcrum.sim.recording.cut import MAGIC, readable
+from fulcrum.synthesis import FulcrumError, InvalidInputError
 
 _PACKAGES = "mesa-vulkan-drivers libvulkan1 libegl1 libegl-mesa0 libgl1-mesa-dri"
 _NO_WINDOW = "the Rerun viewer could not open a window on this machine."

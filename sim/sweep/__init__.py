@@ -1,1 +1,1 @@
-"""Many episodes in many worlds: how often each controller succeeds, and why it fails where not."""
+"""Many runs in drawn worlds: design, episodes on workers, rows, rates."""

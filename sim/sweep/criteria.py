@@ -6,12 +6,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from sim.checks import each, positive
-from sim.run import Result
-from sim.scenario import Scenario
-from sim.schedule import Schedule
-from sim.trace import Trace, stretches
-from synthesis.contact import Mask
+from fulcrum.sim.motion.schedule import Schedule
+from fulcrum.sim.run.execute import Result
+from fulcrum.sim.scenario.scenario import Scenario
+from fulcrum.sim.signals.trace import Trace, stretches
+from fulcrum.synthesis.arrays import Mask
+from fulcrum.synthesis.checks import each, positive
 
 
 @dataclass(frozen=True)

@@ -9,17 +9,17 @@ from dataclasses import dataclass
 from importlib.metadata import version
 from typing import Any
 
-from sim.checks import whole
-from sim.execution import Planning
-from sim.files import finite
-from sim.run import PACKAGES
-from sim.scenario import Scenario
-from sim.settings import controllers
-from sim.sweep.criteria import Criteria
-from sim.sweep.parameters import Grid, overridden
-from sim.uncertainty import draw, preset
-from sim.world import World
-from synthesis import InvalidInputError
+from fulcrum.sim.planning.execution import Planning
+from fulcrum.sim.run.execute import PACKAGES
+from fulcrum.sim.run.files import finite
+from fulcrum.sim.scenario.control import controllers
+from fulcrum.sim.scenario.scenario import Scenario
+from fulcrum.sim.sweep.criteria import Criteria
+from fulcrum.sim.world.parameters import Grid, overridden
+from fulcrum.sim.world.presets import draw, preset
+from fulcrum.sim.world.world import World
+from fulcrum.synthesis import InvalidInputError
+from fulcrum.synthesis.checks import whole
 
 # More take days, and a task each in memory.
 _MOST = 100_000

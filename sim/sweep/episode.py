@@ -9,19 +9,19 @@ from collections.abc import Mapping, Sequence
 from functools import lru_cache
 from typing import Any
 
-from sim.execution import planned_tilt
-from sim.files import finite
-from sim.ik import plan_joints
-from sim.preparation import Preparation, prepare
-from sim.robot import RobotModel
-from sim.run import Request, Result, execute
-from sim.scenario import Scenario
-from sim.settings import Control, controllers
-from sim.sweep.criteria import violations
-from sim.sweep.design import Episode, Sweep
-from sim.sweep.parameters import PARAMETERS
-from sim.trace import stretches
-from sim.world import World
+from fulcrum.sim.model.robot import RobotModel
+from fulcrum.sim.motion.ik import plan_joints
+from fulcrum.sim.planning.execution import planned_tilt
+from fulcrum.sim.run.execute import Request, Result, execute
+from fulcrum.sim.run.files import finite
+from fulcrum.sim.run.preparation import Preparation, prepare
+from fulcrum.sim.scenario.control import Control, controllers
+from fulcrum.sim.scenario.scenario import Scenario
+from fulcrum.sim.signals.trace import stretches
+from fulcrum.sim.sweep.criteria import violations
+from fulcrum.sim.sweep.design import Episode, Sweep
+from fulcrum.sim.world.parameters import PARAMETERS
+from fulcrum.sim.world.world import World
 
 Row = dict[str, Any]
 

@@ -16,12 +16,12 @@ import pyarrow as pa
 from distributed import Client, KilledWorker, LocalCluster, as_completed
 from distributed.comm.core import CommClosedError
 
-from sim.checks import whole
-from sim.sweep.design import Episode, Sweep
-from sim.sweep.episode import check_holdable, run_episode
-from sim.sweep.store import Store
-from sim.sweep.summary import Score, scores
-from synthesis import FulcrumError, InvalidInputError
+from fulcrum.sim.sweep.design import Episode, Sweep
+from fulcrum.sim.sweep.episode import check_holdable, run_episode
+from fulcrum.sim.sweep.store import Store
+from fulcrum.sim.sweep.summary import Score, scores
+from fulcrum.synthesis import FulcrumError, InvalidInputError
+from fulcrum.synthesis.checks import whole
 
 # How long a scheduler may take to answer, and its first worker to come [s].
 _PATIENCE_S = 10
@@ -80,7 +80,7 @@ class Outcome:
     scores: tuple[Score, ...]
 
     def _repr_markdown_(self) -> str:
-        from sim.notebook import outcome_markdown
+        from fulcrum.sim.run.notebook import outcome_markdown
 
         return outcome_markdown(self)
 
@@ -182,7 +182,7 @@ def cluster(workers: Workers) -> Iterator[Client]:
                     processes=True,
                     dashboard_address="127.0.0.1:0",  # only for its own use; there is no dashboard
                     silence_logs=logging.CRITICAL,
-                    preload="sim.sweep.quiet",
+                    preload="fulcrum.sim.sweep.quiet",
                 )
             )
         else:

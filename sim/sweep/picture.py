@@ -11,9 +11,9 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.colors import Normalize
 from matplotlib.figure import Figure
 
-from sim.sweep.design import Sweep
-from sim.sweep.parameters import PARAMETERS
-from synthesis.contact import Array
+from fulcrum.sim.sweep.design import Sweep
+from fulcrum.sim.world.parameters import PARAMETERS
+from fulcrum.synthesis.arrays import Array
 
 # Of sampled parameters, which have no grid: so many bins a side.
 _BINS = 8

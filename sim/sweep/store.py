@@ -11,10 +11,10 @@ from typing import Any
 import pyarrow as pa
 import pyarrow.parquet as pq
 
-from sim.files import check_new_folder, write_json
-from sim.sweep.design import Episode, Sweep
-from sim.sweep.episode import Row
-from synthesis import InvalidInputError
+from fulcrum.sim.run.files import check_new_folder, write_json
+from fulcrum.sim.sweep.design import Episode, Sweep
+from fulcrum.sim.sweep.episode import Row
+from fulcrum.synthesis import InvalidInputError
 
 CONFIG, PARTS, EPISODES, SUMMARY, MAP = (
     "config.json",

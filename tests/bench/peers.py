@@ -12,8 +12,8 @@ import cvxpy as cp
 import numpy as np
 import scipy.sparse as sp
 
-from synthesis.conic import ConicForm
-from synthesis.solver import solver_settings
+from fulcrum.synthesis.conic import ConicForm
+from fulcrum.synthesis.solver import solver_settings
 
 TOLERANCE = 1e-9
 

@@ -13,16 +13,16 @@ import mujoco
 import numpy as np
 import pytest
 
-from scenarios import scenario
-from sim.controller import Controller
-from sim.loop import ClosedLoop
-from sim.monitor import Monitor
-from sim.plant import Plant
-from sim.recording import Recorder
-from sim.robot import RobotModel
-from sim.run import Request, execute
-from sim.statics import Statics
-from synthesis import Synthesizer
+from fulcrum.scenarios import scenario
+from fulcrum.sim.control.controller import Controller
+from fulcrum.sim.evaluation.monitor import Monitor
+from fulcrum.sim.model.robot import RobotModel
+from fulcrum.sim.model.statics import Statics
+from fulcrum.sim.plant.mujoco import Plant
+from fulcrum.sim.recording import Recorder
+from fulcrum.sim.run.execute import Request, execute
+from fulcrum.sim.run.loop import ClosedLoop
+from fulcrum.synthesis import Synthesizer
 
 LOOP = "closed loop of box-tilt, recording on"
 START = "start-up and memory"
@@ -47,8 +47,8 @@ FIRST_STEP = """
 from pathlib import Path
 import sys
 from scenarios import scenario
-from sim.run import Request, execute
-from sim.plant import Plant
+from fulcrum.sim.run.execute import Request, execute
+from fulcrum.sim.plant.mujoco import Plant
 step = Plant.step
 def first(self):
     step(self)
@@ -62,7 +62,7 @@ WHOLE_RUN = """
 from pathlib import Path
 import sys
 from scenarios import scenario
-from sim.run import Request, execute
+from fulcrum.sim.run.execute import Request, execute
 box_tilt = scenario("box-tilt")
 execute(Request(box_tilt, "margin", box_tilt.control, out=Path(sys.argv[1])))
 """
@@ -146,7 +146,7 @@ def _environment():
 def test_start_of_help(table):
     command = Path(sys.executable).with_name("fulcrum")
     start = [str(command)] if command.exists() else [
-        sys.executable, "-c", "from scenarios.cli import main; main()"]  # fmt: skip
+        sys.executable, "-c", "from fulcrum.scenarios.cli import main; main()"]  # fmt: skip
     times = []
     for _ in range(6):
         started = time.perf_counter()

@@ -12,12 +12,12 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from scenarios import scenario
-from sim.ik import plan_joints
-from sim.path import ScrewPath
-from sim.robot import RobotModel
-from sim.statics import Statics
-from synthesis import (
+from fulcrum.scenarios import scenario
+from fulcrum.sim.model.object_path import ScrewPath
+from fulcrum.sim.model.robot import RobotModel
+from fulcrum.sim.model.statics import Statics
+from fulcrum.sim.motion.ik import plan_joints
+from fulcrum.synthesis import (
     Contact,
     ContactModel,
     InfeasibleError,
@@ -26,7 +26,7 @@ from synthesis import (
     Role,
     Synthesizer,
 )
-from synthesis.contact import grasp_maps
+from fulcrum.synthesis.contact import grasp_maps
 from tests.bench import peers
 from tests.bench.conftest import ratio, wall_times
 

@@ -1,0 +1,193 @@
+"""What the commands share: exit codes, the choice of a controller, progress, output files."""
+
+from __future__ import annotations
+
+import contextlib
+import itertools
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass, field, replace
+from datetime import datetime
+from enum import StrEnum
+from pathlib import Path
+from typing import TYPE_CHECKING, Protocol, TypeVar
+
+import tyro
+
+if TYPE_CHECKING:
+    from fulcrum.sim.planning.execution import Planning
+    from fulcrum.sim.scenario.control import Control
+    from fulcrum.sim.scenario.scenario import Scenario
+
+Kind = TypeVar("Kind", bound=StrEnum)
+
+PASSED, FAILED, BAD_INPUT, INTERRUPTED = 0, 1, 2, 130
+
+
+@dataclass(frozen=True)
+class Chosen:
+    """What every command on a scenario is told."""
+
+    scenario: tyro.conf.Positional[str]
+    """Name of a scenario (see `fulcrum list`), or a file ending in .toml (see `fulcrum new`)."""
+
+    allow_path: tyro.conf.UseAppendAction[tuple[Path, ...]] = field(default=(), kw_only=True)
+    """Folder besides its own from which the file may have meshes and robots read."""
+
+    def chosen(self) -> Scenario:
+        """The scenario.
+
+        Raises:
+            InvalidInputError: There is none of that name, or the file is not valid.
+        """
+        from fulcrum.scenarios import scenario
+
+        return scenario(self.scenario, self.allow_path)
+
+    def told(self, error: Exception) -> str:
+        """An error as a sentence, with the scenario's file, if it has one, and what may help."""
+        from fulcrum.scenarios.reading.file import SUFFIX, open_source
+        from fulcrum.scenarios.reading.source import FileError
+        from fulcrum.sim.motion.joint_path import PathError
+        from fulcrum.synthesis.errors import InvalidInputError
+
+        of_an_option = isinstance(error, InvalidInputError) and error.field.startswith("--")
+        named = isinstance(error, (FileError, OSError)) or of_an_option
+        if not self.scenario.endswith(SUFFIX) or named:
+            return str(error)
+        if not isinstance(error, PathError):
+            return f"{self.scenario}: {error}"
+        line = open_source(Path(self.scenario)).line(("path",))
+        return (
+            f"{self.scenario}:{line}: path: {str(error).rstrip('.')}; "
+            f"`fulcrum place {self.scenario}` seeks places for object, robots and hands that can."
+        )
+
+    @property
+    def words(self) -> list[str]:
+        """How a command line names it."""
+        allowed = [("--allow-path", str(folder)) for folder in self.allow_path]
+        return [self.scenario, *itertools.chain.from_iterable(allowed)]
+
+
+def chosen_control(scenario: Scenario, controller: str, objective: str | None) -> Control:
+    """The scenario's control of a name, with another objective if one is given.
+
+    Raises:
+        InvalidInputError: There is no such controller or objective.
+    """
+    from fulcrum.sim.scenario.control import controller as named
+    from fulcrum.synthesis.problem import Objective
+
+    control = named(scenario.control, controller, "--controller")
+    if objective is None:
+        return control
+    return replace(control, objective=one_of(Objective, "--objective", objective))
+
+
+def one_of(kind: type[Kind], option: str, text: str) -> Kind:
+    """The member of an enumeration that an option names.
+
+    Raises:
+        InvalidInputError: It names none.
+    """
+    from fulcrum.synthesis.errors import InvalidInputError
+
+    if text not in list(kind):
+        raise InvalidInputError(option, text, f"one of {', '.join(kind)}")
+    return kind(text)
+
+
+def chosen_planning(
+    scenario: Scenario, plan: str | None, stretch: float, duration: float | None, robust: bool
+) -> Planning | None:
+    """How the tilt is planned; None if it is not.
+
+    Raises:
+        InvalidInputError: There is no such plan, or none to be stretched or made robust.
+    """
+    from fulcrum.synthesis.errors import InvalidInputError
+
+    if plan is not None:
+        return asked_planning(scenario, "--plan", plan, stretch, duration, robust)
+    for option, given, default in (("--stretch", stretch, 1.0), ("--robust", robust, False)):
+        if given != default:
+            raise InvalidInputError(option, given, "given with --plan")
+    return None
+
+
+def asked_planning(
+    scenario: Scenario,
+    option: str,
+    objective: str,
+    stretch: float,
+    duration: float | None,
+    robust: bool,
+    points: int = 100,
+) -> Planning:
+    """A plan as it is asked for; with the scenario's own duration if the objective needs one.
+
+    Raises:
+        InvalidInputError: There is no such plan.
+    """
+    from fulcrum.sim.planning.execution import Planning
+    from fulcrum.sim.scenario.phases import tilting
+    from fulcrum.synthesis.path.problem import PathObjective
+
+    kind = one_of(PathObjective, option, objective)
+    if duration is None:
+        own = sum(scenario.phases[i].duration_s for i in tilting(scenario.phases))
+        duration = own if kind.needs_duration else math.inf
+    return Planning(stretch, points, kind, duration, robust)
+
+
+class Move(Protocol):
+    """Moves a progress bar to what is done of a total; a note stands beside it."""
+
+    def __call__(self, done: int, total: int, note: str = "") -> None:
+        """Moves it."""
+
+
+@contextlib.contextmanager
+def progress_bar(name: str) -> Iterator[Move]:
+    """A progress bar with time left, on stderr; yields the function that moves it."""
+    from rich.console import Console
+    from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
+
+    share, left = TextColumn("{task.percentage:3.0f} %"), TimeRemainingColumn()
+    columns = (TextColumn(name), BarColumn(), share, left, TextColumn("{task.fields[note]}"))
+    console = Console(stderr=True)
+    quiet = not console.is_terminal
+    with Progress(*columns, console=console, transient=True, disable=quiet) as bar:
+        task = bar.add_task(name, total=None, note="")
+
+        def move(done: int, total: int, note: str = "") -> None:
+            bar.update(task, completed=done, total=total, note=note)
+
+        yield move
+
+
+def check_json(path: Path | None) -> None:
+    """Raises InvalidInputError before the work is done if a JSON file could not be written."""
+    if path is not None and (path.is_dir() or not path.parent.is_dir()):
+        from fulcrum.synthesis.errors import InvalidInputError
+
+        raise InvalidInputError("--json", str(path), "a file in a folder that exists")
+
+
+def results_folder(out: Path | None, name: str) -> Path:
+    """The folder asked for, if results may be written there; logs/NAME-TIME if none is.
+
+    Raises:
+        InvalidInputError: It is not empty, or cannot be a folder.
+    """
+    from fulcrum.sim.run.files import check_new_folder
+
+    folder = out or dated_folder(name)
+    check_new_folder("--out", folder)
+    return folder
+
+
+def dated_folder(name: str) -> Path:
+    """logs/NAME-TIME."""
+    return Path("logs") / f"{name}-{datetime.now():%Y%m%d-%H%M%S}"

@@ -1,0 +1,246 @@
+"""The command that measures controllers in many worlds: ``fulcrum sweep``."""
+
+from __future__ import annotations
+
+import dataclasses
+import shlex
+import sys
+import time
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from fulcrum.scenarios.commands.common import (
+    FAILED,
+    INTERRUPTED,
+    PASSED,
+    Chosen,
+    chosen_planning,
+    dated_folder,
+    progress_bar,
+)
+
+if TYPE_CHECKING:
+    from fulcrum.sim.run.execute import Result
+    from fulcrum.sim.scenario.scenario import Scenario
+    from fulcrum.sim.sweep.design import Sweep as Design
+    from fulcrum.sim.sweep.summary import Score
+    from fulcrum.sim.world.world import World
+
+# How many causes of failure the table names of each controller.
+_NAMED = 4
+
+
+@dataclass(frozen=True)
+class Sweep(Chosen):
+    """Run a scenario in many worlds: success rates, causes of failure, success map, replays."""
+
+    episodes: int
+    """How many worlds; with a grid, at each of its points."""
+
+    preset: str = "field"
+    """How far worlds are from what is believed: nominal, lab, field or harsh."""
+
+    controllers: str | None = None
+    """Names with commas between; all meet the same worlds. All with feed-forward if left out: with
+    a plan those that count with inertia, else those that do not."""
+
+    plan: str | None = None
+    """least-time, least-effort or friction-margin: plan the tilt, and execute that in every
+    world."""
+
+    stretch: float = 1.0
+    """By how much the planned duration is stretched."""
+
+    robust: bool = False
+    """The plan also serves the uncertainty set of controller robust, or as much as it can."""
+
+    duration: float | None = None
+    """The longest that a plan may take [s]; the scenario's own if left out."""
+
+    grid: str = ""
+    """What to set of every world drawn, like friction=0.7:1.3:7,weight=0.8,1.0,1.2 (factors)."""
+
+    workers: int | None = None
+    """Processes on this machine; one for each of its processors if left out."""
+
+    scheduler: str | None = None
+    """Address of a running Dask cluster instead, like tcp://host:8786."""
+
+    seed: int = 0
+    """Of the first world; the next have the next."""
+
+    map: str | None = None
+    """The two parameters of the map, like mass,friction; the grid's, or mass,hand_friction."""
+
+    out: Path | None = None
+    """Folder for the results; a sweep that was broken off there is gone on with.
+    logs/sweep-SCENARIO-PRESET-TIME if left out."""
+
+    def execute(self) -> int:
+        """Does it; returns the exit code."""
+        from fulcrum.sim.planning.plan import PlanError
+        from fulcrum.sim.run.files import write_json
+        from fulcrum.sim.sweep.farm import Workers, run_sweep
+        from fulcrum.sim.sweep.picture import draw_map
+        from fulcrum.sim.sweep.store import MAP, SUMMARY, Store
+
+        workers = Workers(self.workers, self.scheduler)
+        try:
+            sweep = self._sweep()
+        except PlanError as error:
+            print(error)
+            return FAILED
+        pair = self._map(sweep)
+        folder = self.out or dated_folder(f"sweep-{sweep.scenario.name}-{self.preset}")
+        store = Store(sweep, folder)
+        before, started = len(store.missing()), time.perf_counter()
+        try:
+            with progress_bar(sweep.scenario.name) as move:
+                outcome = run_sweep(
+                    sweep,
+                    folder,
+                    workers,
+                    lambda done, total, failures: move(
+                        done, total, f"{done} of {total}, {failures} failed"
+                    ),
+                )
+        except KeyboardInterrupt:
+            left = len(store.missing())
+            done = len(sweep.all_episodes()) - left
+            print(
+                f"fulcrum: interrupted; {done} episodes are kept, {left} are left. Go on with: "
+                f"{self._again(store.folder)}",
+                file=sys.stderr,
+            )
+            return INTERRUPTED
+        minutes = (time.perf_counter() - started) / 60.0
+        found = outcome.scores
+        draw_map(outcome.rows, sweep, pair, store.folder / MAP)
+        summary = {
+            "scenario": sweep.scenario.name,
+            "preset": self.preset,
+            "episodes": self.episodes,
+            "seed": self.seed,
+            "grid": {name: list(values) for name, values in sweep.grid},
+            "criteria": dataclasses.asdict(sweep.criteria),
+            "controllers": {score.controller: dataclasses.asdict(score) for score in found},
+            "map": list(pair),
+        }
+        if before:  # else an earlier call's time stands there
+            summary |= {
+                "session": {
+                    "episodes": before,
+                    "minutes": minutes,
+                    "episodes_per_minute": before / minutes,
+                    "workers": self.workers,
+                    "scheduler": self.scheduler,
+                }
+            }
+        write_json(store.folder / SUMMARY, summary)
+        _print(found, store.folder, before / minutes if before else None)
+        return PASSED
+
+    def _sweep(self) -> Design:
+        from fulcrum.sim.planning.execution import planned_tilt
+        from fulcrum.sim.scenario.control import controllers
+        from fulcrum.sim.sweep.design import Sweep as Design
+        from fulcrum.sim.world.parameters import parse_grid
+
+        chosen = self.chosen()
+        asked = self.plan, self.stretch, self.duration, self.robust
+        planning = chosen_planning(chosen, *asked)
+        if planning is not None:
+            chosen = planned_tilt(chosen, planning).scenario
+        if self.controllers is None:
+            known = controllers(chosen.control)
+            fast = planning is not None
+            names = [n for n, c in known.items() if c.feedforward and c.inertia is fast]
+        else:
+            names = [name.strip() for name in self.controllers.split(",")]
+        return Design(
+            scenario=chosen,
+            controllers=tuple(names),
+            preset=self.preset,
+            episodes=self.episodes,
+            seed=self.seed,
+            grid=parse_grid("--grid", self.grid),
+            planning=planning,
+            called=shlex.join(self.words),
+        )
+
+    def _map(self, sweep: Design) -> tuple[str, str]:
+        from fulcrum.sim.world.parameters import parameter_name
+        from fulcrum.synthesis.errors import InvalidInputError
+
+        if self.map is None:
+            names = [name for name, _ in sweep.grid]
+            names += [name for name in ("mass", "hand_friction") if name not in names]
+            return names[0], names[1]
+        names = [parameter_name("--map", name) for name in self.map.split(",")]
+        if len(set(names)) != 2 or len(names) != 2:
+            raise InvalidInputError("--map", self.map, "two parameters, like mass,friction")
+        return names[0], names[1]
+
+    def _again(self, folder: Path) -> str:
+        """The command that goes on with this sweep."""
+        words = ["fulcrum", "sweep", *self.words]
+        for field in dataclasses.fields(self):
+            value = folder if field.name == "out" else getattr(self, field.name)
+            # No False: 0 is one to Python, and a seed.
+            if field.name in ("scenario", "allow_path") or value in (None, "") or value is False:
+                continue
+            words += [f"--{field.name}"] if value is True else [f"--{field.name}", str(value)]
+        return shlex.join(words)
+
+
+def drawn_world(scenario: Scenario, preset: str, seed: int, values: str) -> World:
+    """The world of a preset and seed, with some values set, as in a sweep's episode.
+
+    Raises:
+        InvalidInputError: There is no such preset, or the values are not of the form that it names.
+    """
+    from fulcrum.sim.world import presets as uncertainty
+    from fulcrum.sim.world.parameters import overridden, parse_values
+
+    drawn = uncertainty.draw(uncertainty.preset(preset), scenario, seed)
+    return overridden(drawn, scenario, parse_values("--world", values))
+
+
+def print_outcome(scenario: Scenario, result: Result) -> None:
+    """Prints whether a run would count as success in a sweep, and why not if not."""
+    from fulcrum.sim.model.robot import RobotModel
+    from fulcrum.sim.sweep.criteria import Criteria, violations
+
+    found = violations(Criteria(), scenario, RobotModel(scenario).joints, result)
+    texts = [f"{violation.text} at {violation.t:.2f} s" for violation in found]
+    print(f"in a sweep: {'failure: ' + ', '.join(texts) if texts else 'success'}")
+
+
+def _print(found: tuple[Score, ...], folder: Path, per_minute: float | None) -> None:
+    from rich.box import SIMPLE
+    from rich.console import Console
+    from rich.markup import escape
+    from rich.table import Table
+
+    console = Console(highlight=False)
+    table = Table("controller", "success", "95 %", "grip", "what failures began with", box=SIMPLE)
+    table.add_row(*map(escape, ("", "[%]", "[%]", "[N]", "[% of episodes]")), style="dim")
+    for score in found:
+        named = [f"{cause.cause} {100 * cause.share:.1f}" for cause in score.causes[:_NAMED]]
+        more = len(score.causes) - _NAMED
+        table.add_row(
+            score.controller,
+            f"{100 * score.rate:.1f}",
+            f"{100 * score.low:.1f} to {100 * score.high:.1f}",
+            f"{score.grip_n:.1f}",
+            ", ".join(named) + (f" and {more} more" if more > 0 else ""),
+        )
+    console.print(table)
+    for score in found:
+        if score.causes:
+            cause = score.causes[0]
+            console.print(f"{score.controller}, {cause.cause}: {cause.replay}", soft_wrap=True)
+    if per_minute is not None:
+        console.print(f"{found[0].episodes} episodes each, {per_minute:.0f} episodes per minute")
+    console.print(f"rows, figures and map: {folder}", soft_wrap=True)

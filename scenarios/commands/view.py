@@ -1,0 +1,53 @@
+"""`fulcrum screenshot` and `fulcrum view`: recordings as pictures, and in the viewer."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import tyro
+
+from fulcrum.scenarios.commands.common import (
+    PASSED,
+)
+
+
+@dataclass(frozen=True)
+class Screenshot:
+    """Draw a moment of a recording as a picture, without a screen."""
+
+    run: tyro.conf.Positional[Path]
+    """Folder of a run, or an .rrd file."""
+
+    at: float
+    """Moment [s]."""
+
+    out: Path | None = None
+    """PNG to write; RUN/screenshot-AT.png if left out."""
+
+    def execute(self) -> int:
+        """Does it; returns the exit code."""
+        from fulcrum.sim.recording import recording_file, screenshot
+        from fulcrum.synthesis.errors import InvalidInputError
+
+        picture = self.out or recording_file(self.run).parent / f"screenshot-{self.at:g}.png"
+        if not picture.parent.is_dir():
+            raise InvalidInputError("--out", str(picture), "a file in a folder that exists")
+        screenshot(self.run, self.at, picture)
+        print(picture)
+        return PASSED
+
+
+@dataclass(frozen=True)
+class View:
+    """Open a recording in the Rerun viewer."""
+
+    run: tyro.conf.Positional[Path]
+    """Folder of a run, or an .rrd file."""
+
+    def execute(self) -> int:
+        """Does it; returns the exit code."""
+        from fulcrum.sim.recording import view
+
+        view(self.run)
+        return PASSED

@@ -1,0 +1,155 @@
+"""From the models of a scenario file to the scenario's own dataclasses."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from fulcrum.assets import ROBOTS
+from fulcrum.scenarios.reading.access import Access
+from fulcrum.scenarios.reading.contacts import make_hand, make_support
+from fulcrum.scenarios.reading.object import Thing, friction, make_object, make_surface, make_thing
+from fulcrum.scenarios.reading.places import direction, only_one, orientation, vector
+from fulcrum.scenarios.reading.settings import control, phases, physics, tolerances
+from fulcrum.scenarios.reading.source import Key, Source
+from fulcrum.scenarios.schema.motion import PosesTable, RobotTable, ScrewTable, TiltTable
+from fulcrum.scenarios.schema.tables import ScenarioFile
+from fulcrum.sim.geometry.pose import Pose
+from fulcrum.sim.scenario.contacts import Rest, Support
+from fulcrum.sim.scenario.path import Pivot, Poses
+from fulcrum.sim.scenario.robot import Robot
+from fulcrum.sim.scenario.scenario import Scenario, View
+
+
+def build(source: Source, file: ScenarioFile, access: Access) -> Scenario:
+    """The scenario of a file, named as the file is.
+
+    Raises:
+        FileError: Something in it does not fit together.
+    """
+    thing = make_thing(source, file.object, access)
+    geoms = {n: make_surface(source, n, table) for n, table in file.environment.items()}
+    _check_names(source, file, thing)
+    supports = tuple(
+        make_support(thing, n, table, file.environment, geoms) for n, table in file.supports.items()
+    )
+    with source.at(()):
+        return Scenario(
+            name=source.file.stem,
+            summary=file.summary,
+            object=make_object(thing, file.object),
+            environment=tuple(geoms.values()),
+            hands=tuple(make_hand(thing, n, hand, access) for n, hand in file.hands.items()),
+            supports=supports,
+            robots=tuple(_robot(source, i, r, access) for i, r in enumerate(file.robots)),
+            path=_path(thing, file.path),
+            rests=_rests(thing, file, supports),
+            phases=phases(source, file.manoeuvre),
+            standoff=file.manoeuvre.standoff_m,
+            holdable=file.holdable,
+            control=control(file.control),
+            physics=physics(file.physics),
+            tolerances=tolerances(file.tolerances),
+            view=View(vector(file.view.eye_m), vector(file.view.target_m)),
+        )
+
+
+def _check_names(source: Source, file: ScenarioFile, thing: Thing) -> None:
+    """Refuses names that stand for two things, and robots with the same prefix."""
+    for name in file.supports:
+        if name in file.hands:
+            raise source.error(("supports", name), name, "a name that no hand has")
+    own = {thing.name, *(geom.name for geom in thing.shape.geoms(thing.name))}
+    for name in file.environment:
+        if name in own:
+            raise source.error(("environment", name), name, "a name that the object has not")
+    prefixes = [robot.prefix for robot in file.robots]
+    for index, prefix in enumerate(prefixes):
+        if prefix in prefixes[:index]:
+            valid = "a prefix that no other robot has"
+            raise source.error(("robots", index, "prefix"), f'"{prefix}"', valid)
+
+
+def _rests(thing: Thing, file: ScenarioFile, supports: tuple[Support, ...]) -> tuple[Rest, ...]:
+    """Surfaces with friction on which no support stands."""
+    taken = {support.surface for support in supports}
+    return tuple(
+        Rest(thing.resting, name, friction(surface.friction))
+        for name, surface in file.environment.items()
+        if surface.friction is not None and name not in taken
+    )
+
+
+def _robot(source: Source, index: int, table: RobotTable, access: Access) -> Robot:
+    key: Key = ("robots", index)
+    posture: dict[str, float] = {}
+    for name, values, unit in (
+        ("posture_deg", table.posture_deg, math.radians(1.0)),
+        ("posture_rad", table.posture_rad, 1.0),
+        ("posture_m", table.posture_m, 1.0),
+    ):
+        for joint, value in values.items():
+            if joint in posture:
+                raise source.error((*key, name, joint), value, "in one posture table alone")
+            posture[joint] = unit * value
+    what = "a URDF or MJCF file"
+    with source.at(key):
+        return Robot(
+            model=access.model((*key, "model"), table.model, tuple(ROBOTS), what),
+            posture=posture,
+            prefix=table.prefix,
+            still=tuple(table.still),
+            base=Pose(vector(table.position_m), orientation(source, key, table)),
+            start_deviation=table.start_deviation,
+            torque_limits={**table.torque_limit_nm, **table.force_limit_n},
+            speed_limits={**table.speed_limit_rad_s, **table.speed_limit_m_s},
+        )
+
+
+def _path(thing: Thing, table: TiltTable | ScrewTable | PosesTable) -> Pivot | Poses:
+    if isinstance(table, PosesTable):
+        return _poses(thing, table)
+    key: Key = ("path",)
+    source = thing.source
+    only_one(source, key, {"edge": table.edge, "point_m": table.point_m})
+    if table.edge is not None:
+        given: object = table.edge
+        if table.axis is not None:
+            raise source.error((*key, "axis"), table.axis, "left out where there is an edge")
+        corners = [thing.corner((*key, "edge"), name) for name in table.edge]
+        first, second = (thing.start.in_parent(end) for end in corners)
+        point, axis = (first + second) / 2.0, second - first
+    else:
+        given = table.axis
+        if table.axis is None:
+            valid = "a direction, such as [0, -1, 0]"
+            raise source.error((*key, "axis"), "nothing", valid)
+        assert table.point_m is not None
+        point, axis = np.asarray(table.point_m), np.asarray(table.axis)
+    length = float(np.linalg.norm(axis))
+    if not 1e-6 < length < 1e6:
+        name = "axis" if table.edge is None else "edge"
+        valid = "two different corners" if table.edge else "a direction, such as [0, -1, 0]"
+        raise source.error((*key, name), given, valid)
+    pitch, travel = 0.0, [0.0, 0.0, 0.0]
+    if isinstance(table, ScrewTable):
+        pitch, travel = table.pitch_m_per_rad, table.travel_m
+    return Pivot(
+        start=thing.start,
+        point_W=vector(point),
+        axis_W=direction(axis / length),
+        angle_deg=table.angle_deg,
+        pitch=pitch,
+        travel=vector(travel),
+    )
+
+
+def _poses(thing: Thing, table: PosesTable) -> Poses:
+    key: Key = ("path", "poses")
+    passed = [
+        Pose(vector(pose.position_m), orientation(thing.source, (*key, i), pose))
+        for i, pose in enumerate(table.poses)
+    ]
+    with thing.source.at(("path",)):
+        return Poses((thing.start, *passed))

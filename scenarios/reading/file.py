@@ -1,0 +1,146 @@
+"""Scenario files: TOML that says everything about a scenario, and its published schema.
+
+A file can run no code, and reads no other files than those in its folder, or where the command line
+allows it.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+from typing import Any, TypeVar
+
+from pydantic import TypeAdapter, ValidationError
+
+from fulcrum.scenarios.reading.access import Access
+from fulcrum.scenarios.reading.build import build
+from fulcrum.scenarios.reading.places import vector
+from fulcrum.scenarios.reading.source import FileError, Source, explained, nearest
+from fulcrum.scenarios.schema.keys import Table
+from fulcrum.scenarios.schema.tables import LiftedFile, ScenarioFile
+from fulcrum.sim.scenario.path import Pivot
+from fulcrum.sim.scenario.phases import HOLD, tilting
+from fulcrum.sim.scenario.scenario import Scenario, lifted
+from fulcrum.synthesis import InvalidInputError
+
+SUFFIX = ".toml"
+SCENES = Path(__file__).resolve().parents[1] / "scenes"
+TEMPLATE = Path(__file__).resolve().parents[1] / "template.toml"
+SCHEMA = SCENES / "scenario.schema.json"
+# Longer ones are no scenario [bytes].
+_LONGEST = 2_000_000
+
+
+def read(file: Path, allowed: tuple[Path, ...] = ()) -> Scenario:
+    """The scenario of a file, named as the file is.
+
+    Args:
+        file: The file.
+        allowed: Folders besides its own from which it may have other files read.
+
+    Raises:
+        FileError: It is not valid; says where and why.
+    """
+    return made(open_source(file), allowed)
+
+
+def made(source: Source, allowed: tuple[Path, ...] = ()) -> Scenario:
+    """The scenario of a text, as :func:`read` of the file that it is for.
+
+    Raises:
+        FileError: It is not valid; says where and why.
+    """
+    if "lifted_from" in source.data:
+        return _lifted(source, _validated(source, LiftedFile), allowed)
+    return build(source, _validated(source, ScenarioFile), Access(source, allowed))
+
+
+def open_source(file: Path) -> Source:
+    """The text of a file.
+
+    Raises:
+        FileError: It cannot be read, or is no TOML.
+    """
+    valid = f"a scenario file, like those that `fulcrum new` writes, with the ending {SUFFIX}"
+    try:
+        if file.stat().st_size > _LONGEST:
+            raise FileError(file, None, "", f"{file.stat().st_size} bytes", valid)
+        return Source(file, file.read_text(encoding="utf-8"))
+    except OSError as error:
+        raise FileError(file, None, "", error.strerror or str(error), valid) from None
+    except ValueError as error:  # no UTF-8, or a name with a zero in it
+        if isinstance(error, FileError):
+            raise
+        raise FileError(file, None, "", "no UTF-8 text", valid) from None
+
+
+Model = TypeVar("Model", bound=Table)
+
+
+def _validated(source: Source, model: type[Model]) -> Model:
+    try:
+        return model.model_validate(source.data)
+    except ValidationError as error:
+        raise explained(source, model, error) from None
+
+
+def _lifted(source: Source, table: LiftedFile, allowed: tuple[Path, ...]) -> Scenario:
+    """The other scenario without its environment contacts."""
+    key = ("lifted_from",)
+    shipped = scene_files()
+    if table.lifted_from in shipped:
+        other = shipped[table.lifted_from]
+    elif table.lifted_from.endswith(SUFFIX):
+        other = Access(source, allowed).file(key, table.lifted_from, "a scenario file")
+    else:
+        raise source.error(key, f'"{table.lifted_from}"', valid_names(table.lifted_from))
+    if "lifted_from" in open_source(other).data:
+        raise source.error(key, f'"{table.lifted_from}"', "a scenario that is not lifted itself")
+    scenario = lifted(read(other, allowed))
+    path, phases = scenario.path, scenario.phases
+    if not isinstance(path, Pivot):
+        raise source.error(key, f'"{table.lifted_from}"', "a scenario with a tilt or a screw")
+    if table.after == "hold":
+        last = max(tilting(phases))
+        phases = (*phases[: last + 1], *HOLD)
+    return replace(
+        scenario,
+        name=source.file.stem,
+        summary=table.summary,
+        path=replace(path, travel=vector(table.travel_m)),
+        phases=phases,
+    )
+
+
+def scene_files() -> dict[str, Path]:
+    """The files of the scenes that ship, by name."""
+    return {path.stem: path for path in sorted(SCENES.glob(f"*{SUFFIX}"))}
+
+
+def named_file(field: str, name: str) -> Path:
+    """The file of a scenario: of one that ships by its name, else by its path.
+
+    Raises:
+        InvalidInputError: It is neither; names the field in which it was given.
+    """
+    shipped = scene_files()
+    if name in shipped:
+        return shipped[name]
+    if not name.endswith(SUFFIX):
+        raise InvalidInputError(field, name, valid_names(name))
+    return Path(name)
+
+
+def valid_names(word: str) -> str:
+    """What a scenario may be called, where a word is none of it."""
+    return f"{nearest(word, list(scene_files()))}, or a file ending in {SUFFIX}"
+
+
+def schema() -> dict[str, Any]:
+    """The JSON Schema of scenario files."""
+    made = TypeAdapter(ScenarioFile | LiftedFile).json_schema()
+    return {
+        "$schema": "https://json-schema.org/draft/2020-12/schema",
+        "title": "fulcrum scenario",
+        **made,
+    }

@@ -1,0 +1,156 @@
+"""From a scenario file to the object and what stands fast around it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from fulcrum.scenarios.reading.access import Access
+from fulcrum.scenarios.reading.places import corner, only_one, orientation, vector
+from fulcrum.scenarios.reading.source import Key, Source
+from fulcrum.scenarios.schema.tables import (
+    AnyObject,
+    BoxTable,
+    CylinderTable,
+    FrictionTable,
+    HollowCylinderTable,
+    SurfaceTable,
+)
+from fulcrum.sim.geometry.geom import Geom
+from fulcrum.sim.geometry.object import GRAVITY, Object
+from fulcrum.sim.geometry.pose import Pose, Vector
+from fulcrum.sim.geometry.shape import Shape, homogeneous
+from fulcrum.sim.geometry.shapes import Box, Cylinder, HollowCylinder, MeshShape
+from fulcrum.sim.scenario.contacts import Friction
+
+# Spacing of the lines with which MuJoCo draws a plane [m].
+_GRID = 0.05
+
+
+@dataclass(frozen=True)
+class Thing:
+    """The object as contacts and path see it.
+
+    Attributes:
+        source: The file.
+        name: The object's.
+        shape: Its shape.
+        start: Its pose at the start.
+    """
+
+    source: Source
+    name: str
+    shape: Shape
+    start: Pose
+
+    @property
+    def resting(self) -> str:
+        """Name of the geom that touches the environment."""
+        return self.shape.resting or self.name
+
+    def corner(self, key: Key, name: str) -> Vector:
+        """A corner in the object frame [m].
+
+        Raises:
+            FileError: The object has none.
+        """
+        if not isinstance(self.shape, Box):
+            raise self.source.error(key, f'"{name}"', "a point_m, as only a box has corners")
+        return corner(self.shape.size, name)
+
+
+def make_thing(source: Source, table: AnyObject, access: Access) -> Thing:
+    """The object's shape and place.
+
+    Raises:
+        FileError: There is no such shape or orientation.
+    """
+    start = Pose(vector(table.position_m), orientation(source, ("object",), table))
+    with source.at(("object",)):
+        return Thing(source, table.name, _shape(table, access), start)
+
+
+def _shape(table: AnyObject, access: Access) -> Shape:
+    if isinstance(table, BoxTable):
+        return Box(vector(table.size_m))
+    if isinstance(table, CylinderTable):
+        return Cylinder(table.radius_m, table.length_m, table.axis)
+    if isinstance(table, HollowCylinderTable):
+        radii = table.outer_radius_m, table.inner_radius_m
+        return HollowCylinder(*radii, table.length_m, table.axis)
+    mesh = access.file(("object", "file"), table.file, "a mesh file (STL, OBJ or PLY)")
+    return MeshShape(str(mesh), table.scale)
+
+
+def make_object(thing: Thing, table: AnyObject) -> Object:
+    """The object with its mass.
+
+    Raises:
+        FileError: Its mass is not given, or in several ways.
+    """
+    key: Key = ("object",)
+    names = ("weight_n", "mass_kg", "density_kg_per_m3")
+    only_one(thing.source, key, {name: getattr(table, name) for name in names})
+    if table.weight_n is not None:
+        mass = table.weight_n / GRAVITY
+    elif table.mass_kg is not None:
+        mass = table.mass_kg
+    else:
+        assert table.density_kg_per_m3 is not None
+        mass = table.density_kg_per_m3 * thing.shape.volume
+    with thing.source.at(key):
+        made = homogeneous(thing.name, thing.shape, mass, colour(table.rgba))
+        if table.center_of_mass_m is not None:
+            made = replace(made, center_of_mass=vector(table.center_of_mass_m))
+        if table.inertia_kg_m2 is not None:
+            axes, moments = Pose().quaternion, vector(table.inertia_kg_m2)
+            made = replace(made, inertia=moments, principal_axes=axes)
+        return made
+
+
+def make_surface(source: Source, name: str, surface: SurfaceTable) -> Geom:
+    """The geom of something that stands fast.
+
+    Raises:
+        FileError: Its kind has another number of lengths, or no front.
+    """
+    key: Key = ("environment", name)
+    quaternion = orientation(source, key, surface)
+    at, size = np.asarray(surface.position_m), surface.size_m
+    count = 2 if surface.kind in ("floor", "post") else 3
+    if len(size) != count:
+        raise source.error((*key, "size_m"), size, f"{count} lengths of a {surface.kind}")
+    if surface.facing is not None and surface.kind != "wall":
+        valid = "left out, as only a wall has a front"
+        raise source.error((*key, "facing"), surface.facing, valid)
+    rgba = colour(surface.rgba)
+    if surface.kind == "floor":
+        half = (size[0] / 2, size[1] / 2, _GRID)
+        return Geom(name, "plane", half, Pose(vector(at), quaternion), rgba, surface.solid)
+    half_sizes = tuple(length / 2 for length in size)
+    lengths = (size[0], *size) if surface.kind == "post" else size
+    behind = -np.asarray(front(surface)) * lengths / 2
+    pose = Pose(vector(Pose(vector(at), quaternion).in_parent(vector(behind))), quaternion)
+    kind = "cylinder" if surface.kind == "post" else "box"
+    return Geom(name, kind, half_sizes, pose, rgba, surface.solid)
+
+
+def front(surface: SurfaceTable) -> Vector:
+    """Outward normal of a surface's front, in its own axes."""
+    if surface.kind != "wall":
+        return (0.0, 0.0, 1.0)
+    facing = surface.facing or "-x"
+    x, y, z = (float(facing == f"+{axis}") - float(facing == f"-{axis}") for axis in "xyz")
+    return (x, y, z)
+
+
+def friction(table: FrictionTable) -> Friction:
+    """Friction of a pair of surfaces."""
+    return Friction(table.mu, table.torsion_m)
+
+
+def colour(values: list[float]) -> tuple[float, float, float, float]:
+    """Red, green, blue, opacity."""
+    r, g, b, a = values
+    return (r, g, b, a)

@@ -1,0 +1,1 @@
+"""What a scenario file may say: tables, keys, units, ranges and their documentation."""

@@ -1,0 +1,127 @@
+"""The scenario file as models: the robots, and the path along which they move the object."""
+
+from __future__ import annotations
+
+from typing import Annotated, Any, Literal
+
+from annotated_types import Gt, Len, Lt
+from pydantic import Discriminator, Field, Tag
+
+from fulcrum.scenarios.schema.keys import (
+    PREFIX,
+    Corner,
+    Direction,
+    NotNegative,
+    Number,
+    Placed,
+    Positive,
+    Table,
+    Text,
+    Vector3,
+)
+
+
+class RobotTable(Placed):
+    """A robot, its place and its start posture; joints that are not named there are locked."""
+
+    model: Text
+    """A name that ships, or a URDF or MJCF file relative to this one."""
+
+    prefix: Annotated[str, Field(pattern=PREFIX)] = ""
+    """What stands before the names of its bodies and joints; robots of a scene differ in it."""
+
+    posture_deg: dict[str, Number] = {}
+    """Start angles by joint [deg], without the prefix; inverse kinematics seeks from there."""
+
+    posture_rad: dict[str, Number] = {}
+    """The same [rad]; a joint is in one of these tables."""
+
+    posture_m: dict[str, Number] = {}
+    """Start positions of sliding joints [m]."""
+
+    still: list[str] = []
+    """Joints that move along the path only if the others cannot do it alone."""
+
+    torque_limit_nm: dict[str, Positive] = {}
+    """Torque limits by joint [N m], where they are to be lower than the description says."""
+
+    force_limit_n: dict[str, Positive] = {}
+    """Force limits of sliding joints [N]."""
+
+    speed_limit_rad_s: dict[str, Positive] = {}
+    """Speed limits by joint [rad/s]."""
+
+    speed_limit_m_s: dict[str, Positive] = {}
+    """Speed limits of sliding joints [m/s]."""
+
+    start_deviation: NotNegative = 1e-4
+    """Standard deviation of the real start posture from the planned one [rad or m]."""
+
+
+Angle = Annotated[Number, Gt(0.0), Lt(180.0)]
+
+
+class TurnTable(Table):
+    """A turn about an edge of the box, or about an axis."""
+
+    angle_deg: Angle = 90.0
+    """Tilt at the end [deg]."""
+
+    edge: Annotated[list[Corner], Len(2, 2)] | None = None
+    """Two corners of the box; it turns about the line from the first to the second, by the
+    right-hand rule."""
+
+    point_m: Vector3 | None = None
+    """A point on the axis, in the world [m], instead of an edge."""
+
+    axis: Direction | None = None
+    """Direction of the axis, in world axes, with point_m."""
+
+
+class TiltTable(TurnTable):
+    """A tilt about an edge of the box, or about an axis."""
+
+    kind: Literal["tilt"] = "tilt"
+    """tilt, screw or poses."""
+
+
+class ScrewTable(TurnTable):
+    """A tilt that also advances."""
+
+    kind: Literal["screw"]
+    """tilt, screw or poses."""
+
+    pitch_m_per_rad: Number = 0.0
+    """Advance along the axis [m/rad]."""
+
+    travel_m: Vector3 = [0.0, 0.0, 0.0]
+    """Translation on top, in proportion to the tilt, at the end [m]."""
+
+
+class PoseTable(Placed):
+    """A pose that the object passes."""
+
+    position_m: Vector3
+    """Position in the world [m]."""
+
+
+class PosesTable(Table):
+    """Poses that the object passes, smoothly in between, from where it is at the start."""
+
+    kind: Literal["poses"]
+    """tilt, screw or poses."""
+
+    poses: Annotated[list[PoseTable], Len(1)]
+    """The poses after the start, each turned against the one before."""
+
+
+def _kind(path: Any) -> Any:
+    return path.get("kind", "tilt") if isinstance(path, dict) else "tilt"
+
+
+AnyPath = Annotated[
+    Annotated[TiltTable, Tag("tilt")]
+    | Annotated[ScrewTable, Tag("screw")]
+    | Annotated[PosesTable, Tag("poses")],
+    Discriminator(_kind),
+]

@@ -1,0 +1,282 @@
+"""The scenario file as models: what is in the scene and who tilts it, key by key.
+
+What these docstrings say is what editors show, from the JSON Schema, and what `fulcrum new` writes
+as comments. Units stand in the names of the keys.
+"""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal
+
+from annotated_types import Len
+from pydantic import Field
+
+from fulcrum.scenarios.schema.keys import (
+    Colour,
+    Corner,
+    Direction,
+    Face,
+    Name,
+    Place2,
+    Placed,
+    Positive,
+    Size3,
+    Table,
+    Text,
+    Vector3,
+)
+from fulcrum.scenarios.schema.motion import AnyPath, RobotTable
+from fulcrum.scenarios.schema.settings import (
+    ControlTable,
+    ManoeuvreTable,
+    PhysicsTable,
+    TolerancesTable,
+    ViewTable,
+)
+
+
+class FrictionTable(Table):
+    """Coulomb friction of a pair of surfaces."""
+
+    mu: Positive
+    """Coefficient of friction [-]."""
+
+    torsion_m: Positive | None = None
+    """Torsional over tangential friction [m], of a soft contact; a hard point without it."""
+
+
+class ObjectTable(Placed):
+    """The thing that is tilted. It needs exactly one of weight_n, mass_kg, density_kg_per_m3."""
+
+    name: Name = "object"
+    """What it is called."""
+
+    weight_n: Positive | None = None
+    """Weight [N], with 9.81 m/s^2."""
+
+    mass_kg: Positive | None = None
+    """Mass [kg]."""
+
+    density_kg_per_m3: Positive | None = None
+    """Density [kg/m^3]; the mass follows from the shape's volume."""
+
+    center_of_mass_m: Vector3 | None = None
+    """Centre of mass in the object's frame [m]; the shape's, if it is left out."""
+
+    inertia_kg_m2: Size3 | None = None
+    """Principal moments of inertia about the centre of mass, along the object's axes [kg m^2];
+    those of the homogeneous shape, if they are left out."""
+
+    rgba: Colour = [0.80, 0.62, 0.40, 0.5]
+    """Colour and opacity."""
+
+
+class BoxTable(ObjectTable):
+    """A box; its frame is at its middle."""
+
+    shape: Literal["box"]
+    """box, cylinder, hollow-cylinder or mesh."""
+
+    size_m: Size3
+    """Lengths of its edges along its x, y and z [m]."""
+
+
+Axis = Literal["x", "y", "z"]
+
+
+class CylinderTable(ObjectTable):
+    """A solid cylinder; its frame is at its middle."""
+
+    shape: Literal["cylinder"]
+    """box, cylinder, hollow-cylinder or mesh."""
+
+    radius_m: Positive
+    """Radius [m]."""
+
+    length_m: Positive
+    """Length [m]."""
+
+    axis: Axis = "z"
+    """Which of the object's axes is the cylinder's."""
+
+
+class HollowCylinderTable(ObjectTable):
+    """A hollow cylinder, open at both ends; its frame is at its middle."""
+
+    shape: Literal["hollow-cylinder"]
+    """box, cylinder, hollow-cylinder or mesh."""
+
+    outer_radius_m: Positive
+    """Outer radius [m]."""
+
+    inner_radius_m: Positive
+    """Inner radius [m]."""
+
+    length_m: Positive
+    """Length [m]."""
+
+    axis: Axis = "z"
+    """Which of the object's axes is the cylinder's."""
+
+
+class MeshTable(ObjectTable):
+    """A closed surface from a file; its frame is the file's."""
+
+    shape: Literal["mesh"]
+    """box, cylinder, hollow-cylinder or mesh."""
+
+    file: Text
+    """STL, OBJ or PLY file, relative to this file and in or below its folder."""
+
+    scale: Positive = 1.0
+    """Metres per unit of the file."""
+
+
+AnyObject = Annotated[
+    BoxTable | CylinderTable | HollowCylinderTable | MeshTable, Field(discriminator="shape")
+]
+
+
+class SurfaceTable(Placed):
+    """Something that stands fast. The object may lie on it if its friction is given."""
+
+    kind: Literal["floor", "table", "step", "post", "wall"]
+    """floor is a plane through position_m; table and step are boxes and post is a cylinder with
+    position_m in the middle of their top; wall is a box with it in the middle of its front."""
+
+    size_m: Annotated[list[Positive], Len(2, 3)]
+    """Lengths along its x, y and z [m]; of a floor along x and y, as far as it is drawn; diameter
+    and height of a post."""
+
+    facing: Literal["+x", "-x", "+y", "-y"] | None = None
+    """Where the front of a wall looks; -x if it is left out."""
+
+    friction: FrictionTable | None = None
+    """Between it and the object. Without, the object passes through it."""
+
+    solid: bool = True
+    """Whether the robots must keep clear of it."""
+
+    rgba: Colour = [0.75, 0.77, 0.80, 1.0]
+    """Colour and opacity."""
+
+
+class HandTable(Table):
+    """A robot's hand, and where it holds the object: at a face, or at a point."""
+
+    mount: Text
+    """The robot's body that carries it, with the robot's prefix."""
+
+    mount_position_m: Vector3 | None = None
+    """Where on that body it sits [m]; at its origin, if it is left out."""
+
+    mount_rpy_deg: Vector3 | None = None
+    """How it is turned there: roll, pitch and yaw [deg]."""
+
+    tip: Text = "palm_pad"
+    """palm_pad, finger_tip, or an MJCF file with a body `pad`, a spherical geom `tip` and a site
+    `tip_center`."""
+
+    face: Face | None = None
+    """Face of the object that it touches: of a box +x, -x, +y, -y, +z, -z."""
+
+    at: Place2 | None = None
+    """Where on the face, from 0 to 1 along each of its two directions; its middle, if left out."""
+
+    point_m: Vector3 | None = None
+    """Where it touches, in the object's frame [m], instead of face and at."""
+
+    normal: Direction | None = None
+    """Inward normal there, in the object's axes; that of the surface, if it is left out."""
+
+    tangent: Direction | None = None
+    """First tangent there, which is the x axis of the tip; z across the normal, if it is left out,
+    or x where the normal is along z."""
+
+    may_touch: list[Face] | None = None
+    """Faces to which `fulcrum place` may move it; its own, if they are left out."""
+
+    friction: FrictionTable
+    """Between tip and object."""
+
+    grip_limit_n: Positive | None = None
+    """Largest normal force [N]; none, if it is left out."""
+
+
+class SupportTable(Table):
+    """A point of the object, or a corner, that stays on a surface while the object tilts."""
+
+    surface: Name
+    """The surface that it stays on."""
+
+    corner: Corner | None = None
+    """Corner of the box, like "-x +y -z"."""
+
+    point_m: Vector3 | None = None
+    """The point in the object's frame [m], instead of a corner."""
+
+    normal: Direction | None = None
+    """Normal into the object, in world axes; that of the surface, if it is left out."""
+
+    tangent: Direction | None = None
+    """First tangent, in world axes; z across the normal, if it is left out, or x where the normal
+    is along z."""
+
+
+class ScenarioFile(Table):
+    """A scenario: what is tilted, on what, by whom, along which path, and what is success."""
+
+    summary: Text
+    """One line for `fulcrum list`."""
+
+    object: AnyObject
+    """The thing that is tilted."""
+
+    environment: dict[Name, SurfaceTable]
+    """What stands fast, by name."""
+
+    hands: Annotated[dict[Name, HandTable], Len(1)]
+    """The robots' hands, by name: they hold the object all the way."""
+
+    supports: dict[Name, SupportTable] = {}
+    """Points of the object that stay on the environment, by name."""
+
+    robots: Annotated[list[RobotTable], Len(1)]
+    """The robots."""
+
+    path: AnyPath
+    """How the object is to move."""
+
+    holdable: bool = True
+    """Whether forces that hold the object are expected all along the path."""
+
+    manoeuvre: ManoeuvreTable = ManoeuvreTable()
+    """Timing of the phases."""
+
+    control: ControlTable = ControlTable()
+    """How forces are synthesised and followed."""
+
+    physics: PhysicsTable = PhysicsTable()
+    """Settings of the contact solver."""
+
+    tolerances: TolerancesTable = TolerancesTable()
+    """What counts as success."""
+
+    view: ViewTable = ViewTable()
+    """Where recordings look from."""
+
+
+class LiftedFile(Table):
+    """A scenario like another one, without the environment's help: the object is to come off."""
+
+    summary: Text
+    """One line for `fulcrum list`."""
+
+    lifted_from: Text
+    """The other one: its name, or its file relative to this one."""
+
+    travel_m: Vector3 = [0.0, 0.0, 0.1]
+    """Translation on top of the tilt, in proportion to it, at the end [m]."""
+
+    after: Literal["leave", "hold"] = "hold"
+    """What comes after the tilt."""

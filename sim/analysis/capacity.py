@@ -1,0 +1,131 @@
+"""The heaviest object that a scenario's robot can pivot, and lift, as optimisation over its weight.
+
+At each tilt the largest weight that contacts and joints can hold is the optimum of one second-order
+cone program; the least of these over the path is the capacity, and the certificate just above it
+says what limits it. Runs in closed loop confirm it; they do not find it.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.optimize import minimize_scalar
+
+from fulcrum.sim.geometry.object import GRAVITY
+from fulcrum.sim.planning.path_problems import PathProblems
+from fulcrum.sim.run.execute import Progress
+from fulcrum.sim.scenario.control import Control
+from fulcrum.sim.scenario.scenario import Scenario, lifted
+from fulcrum.synthesis import InfeasibleError, Synthesizer
+from fulcrum.synthesis.analysis.conflict import Conflict, conflict
+from fulcrum.synthesis.analysis.relaxation import Kind, change, weight_range
+
+_STEP_DEG = 1.0
+# How well the tightest tilt is found [deg].
+_TILT_DEG = 1e-3
+
+
+@dataclass(frozen=True)
+class Capacity:
+    """The heaviest object in one manoeuvre, with the controller's margins.
+
+    Attributes:
+        manoeuvre: pivot or lift.
+        weight: That can be held at every tilt of the path [N]; infinite if any can.
+        mass: [kg].
+        tilt_deg: Where it is limited [deg].
+        lightest: The least weight that can be held at every tilt [N]; above 0 if preloads need it.
+        conflict: What limits it there; None if nothing does.
+        confirmed_within: How near to the weight solving again tells feasible from infeasible [-].
+        tilts_deg: Grid of tilts [deg].
+        weights: Largest weight at each [N]; 0 where none can be held.
+    """
+
+    manoeuvre: str
+    weight: float
+    mass: float
+    tilt_deg: float
+    lightest: float
+    conflict: Conflict | None
+    confirmed_within: float
+    tilts_deg: tuple[float, ...]
+    weights: tuple[float, ...]
+
+
+def capacities(
+    scenario: Scenario, control: Control, progress: Progress | None = None
+) -> tuple[Capacity, ...]:
+    """What can be pivoted, if the scenario has supports, and what can be lifted, without them.
+
+    Args:
+        scenario: The scene; its object's mass is where the search starts from.
+        control: The controller, whose margins count.
+        progress: Called with tilts done and tilts in total.
+
+    Raises:
+        PathError: The arms cannot follow the path.
+    """
+    scenes = [("lift", lifted(scenario))]
+    if scenario.supports:
+        scenes.insert(0, ("pivot", scenario))
+    found = []
+    for i, (manoeuvre, scene) in enumerate(scenes):
+
+        def report(done: int, total: int, before: int = i) -> None:
+            if progress is not None:
+                progress(before * total + done, len(scenes) * total)
+
+        found.append(_capacity(manoeuvre, PathProblems(scene, control), report))
+    return tuple(found)
+
+
+def _capacity(
+    manoeuvre: str, problems: PathProblems, progress: Callable[[int, int], None]
+) -> Capacity:
+    synthesizer = Synthesizer()
+
+    def span(tilt: float) -> tuple[float, float]:
+        try:
+            return weight_range(problems.problem(tilt), problems.gravity(tilt), synthesizer)
+        except InfeasibleError:
+            return 0.0, 0.0
+
+    tilts = problems.tilts(_STEP_DEG)
+    spans = []
+    for done, tilt in enumerate(tilts, start=1):
+        spans.append(span(float(tilt)))
+        progress(done, len(tilts))
+    weights = [heaviest for _, heaviest in spans]
+    first = int(np.argmin(weights))
+    tilt, weight = float(tilts[first]), weights[first]
+    if 0.0 < weight < math.inf:
+        around = tilts[max(first - 1, 0)], tilts[min(first + 1, len(tilts) - 1)]
+        refined = minimize_scalar(
+            lambda t: span(float(t))[1],
+            bounds=around,
+            method="bounded",
+            options={"xatol": _TILT_DEG},
+        )
+        if refined.fun < weight:
+            tilt, weight = float(refined.x), float(refined.fun)
+    limit, within = None, 0.0
+    if math.isfinite(weight):
+        gravity = problems.gravity(tilt)
+        found = change(Kind.WEIGHT, problems.problem(tilt), gravity, synthesizer)
+        within = found.confirmed_within
+        if found.conflict is not None:
+            limit = conflict(found.conflict, gravity, problems.orientation(tilt))
+    return Capacity(
+        manoeuvre=manoeuvre,
+        weight=weight,
+        mass=weight / GRAVITY,
+        tilt_deg=tilt,
+        lightest=max(lightest for lightest, _ in spans),
+        conflict=limit,
+        confirmed_within=within,
+        tilts_deg=tuple(map(float, tilts)),
+        weights=tuple(map(float, weights)),
+    )

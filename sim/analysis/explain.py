@@ -1,0 +1,282 @@
+"""Why a scenario's problem is infeasible and what would help, or how much a feasible one bears."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from fulcrum.sim.planning.path_problems import PathProblems
+from fulcrum.synthesis import InfeasibleError, Solution, Synthesizer
+from fulcrum.synthesis.analysis.conflict import Conflict, and_list, conflict, relaxed, tightest
+from fulcrum.synthesis.analysis.relaxation import Change, Kind, Outcome, changes, weight_range
+from fulcrum.synthesis.analysis.sensitivity import UNITS, Sensitivities, sensitivities
+from fulcrum.synthesis.arrays import N
+from fulcrum.synthesis.problem import Gravity, Problem
+
+# Steps of the scan for the tightest tilt [deg].
+_SCAN_DEG = 5.0
+# By which share of it a limit is relaxed to see whether that helps.
+RELAXED = 0.1
+# How near to its limit, relative, a force, torque or utilisation counts as at it.
+_ACTIVE = 1e-6
+
+
+@dataclass(frozen=True)
+class Remedy:
+    """One kind of change: what is needed of it, or what can be borne.
+
+    Attributes:
+        outcome: See :class:`synthesis.analysis.relaxation.Outcome`.
+        factor: The border of the feasible factors [-]; infinite for "any weight".
+        confirmed_within: How near to the border solving again tells feasible from infeasible [-];
+            infinite if not confirmed.
+        text: In words.
+        conflict: What stands in the way beyond the border.
+    """
+
+    outcome: Outcome
+    factor: float
+    confirmed_within: float
+    text: str
+    conflict: Conflict | None
+
+
+@dataclass(frozen=True)
+class Influence:
+    """What a parameter does to the objective.
+
+    Attributes:
+        value: Of the parameter.
+        unit: Of the parameter.
+        slope: Derivative of the objective by it, in their units.
+        per_percent: Change of the objective per percent of the parameter [%].
+    """
+
+    value: float
+    unit: str
+    slope: float
+    per_percent: float
+
+
+@dataclass(frozen=True)
+class Optimum:
+    """The optimal solution of a feasible problem.
+
+    Attributes:
+        value: The objective, in ``unit``.
+        unit: N, N·m or -.
+        normal_forces: Of each contact [N].
+        active: Limits that are reached.
+        sensitivities: Derivatives of the value.
+        influences: The parameters that matter, by name.
+    """
+
+    value: float
+    unit: str
+    normal_forces: dict[str, float]
+    active: tuple[str, ...]
+    sensitivities: Sensitivities
+    influences: dict[str, Influence]
+
+
+@dataclass(frozen=True)
+class Explanation:
+    """All that is to be said about a scenario's problem at one tilt.
+
+    Attributes:
+        scenario: Name of the scenario.
+        object: Name of the object.
+        objective: What is minimised.
+        tilt_deg: [deg].
+        weight: Of the object [N].
+        feasible: Whether there are forces.
+        conflict: Why not, of an infeasible problem.
+        gains: By how much more weight can be held [-] if one limit of the conflict alone is relaxed
+            by ``RELAXED``; of an infeasible problem that holds some weight.
+        optimum: The solution of a feasible one.
+        changes: By kind: what would help, or what is borne.
+    """
+
+    scenario: str
+    object: str
+    objective: str
+    tilt_deg: float
+    weight: float
+    feasible: bool
+    conflict: Conflict | None
+    gains: dict[str, float]
+    optimum: Optimum | None
+    changes: dict[Kind, Remedy]
+
+
+def tightest_tilt(problems: PathProblems, synthesizer: Synthesizer) -> float:
+    """The first infeasible tilt of a scan, else the one that bears the least weight [deg]."""
+    tilts = problems.tilts(_SCAN_DEG)
+    heaviest = []
+    for tilt in tilts:
+        problem, gravity = problems.problem(tilt), problems.gravity(tilt)
+        try:
+            low, high = weight_range(problem, gravity, synthesizer)
+        except InfeasibleError:
+            return float(tilt)
+        if not low <= gravity.weight <= high:
+            return float(tilt)
+        heaviest.append(high)
+    if math.isinf(min(heaviest)):
+        # Without limits any weight can be held: then where the objective is largest.
+        values = [synthesizer.solve(problems.problem(tilt)).value for tilt in tilts]
+        return float(tilts[int(np.argmax(values))])
+    return float(tilts[int(np.argmin(heaviest))])
+
+
+def explain(problems: PathProblems, tilt_deg: float, synthesizer: Synthesizer) -> Explanation:
+    """Explains the problem at a tilt [deg].
+
+    Raises:
+        InvalidInputError: The tilt is not on the path.
+    """
+    problem, gravity = problems.problem(tilt_deg), problems.gravity(tilt_deg)
+    R_WO = problems.orientation(tilt_deg)
+    found = changes(problem, gravity, synthesizer)
+    why_not, optimum = None, None
+    try:
+        optimum = _optimum(synthesizer.solve(problem), gravity)
+    except InfeasibleError as error:
+        why_not = conflict(tightest(error.certificate, found), gravity, R_WO)
+    remedies = {}
+    for kind, change in found.items():
+        blocked = None
+        if change.conflict is not None:
+            blocked = conflict(change.conflict, gravity, R_WO)
+        text = _words(change, problem, gravity)
+        remedies[kind] = Remedy(
+            change.outcome, change.factor, change.confirmed_within, text, blocked
+        )
+    return Explanation(
+        scenario=problems.scenario.name,
+        object=problems.scenario.object.name,
+        objective=problem.objective,
+        tilt_deg=float(tilt_deg),
+        weight=gravity.weight,
+        feasible=optimum is not None,
+        conflict=why_not,
+        gains={} if why_not is None else _gains(problem, gravity, why_not, synthesizer),
+        optimum=optimum,
+        changes=remedies,
+    )
+
+
+def _gains(
+    problem: Problem, gravity: Gravity, why_not: Conflict, synthesizer: Synthesizer
+) -> dict[str, float]:
+    try:
+        _, before = weight_range(problem, gravity, synthesizer)
+    except InfeasibleError:
+        return {}
+    if before == 0.0 or math.isinf(before):
+        return {}
+    return {
+        name: weight_range(looser, gravity, synthesizer)[1] / before - 1.0
+        for name, looser in relaxed(problem, RELAXED).items()
+        if name in why_not.limits
+    }
+
+
+def _optimum(solution: Solution, gravity: Gravity) -> Optimum:
+    problem = solution.problem
+    slopes = sensitivities(solution, gravity)
+    rows = [("weight", gravity.weight, "N", slopes.weight)]
+    for c in problem.contacts:
+        for what, value, unit, by_name in (
+            ("friction", c.mu, "-", slopes.friction),
+            ("preload", c.f_n_min, "N", slopes.f_n_min),
+            ("grip limit", c.f_n_max, "N", slopes.f_n_max),
+        ):
+            if c.name in by_name:
+                rows.append((f"{what} of {c.name}", value, unit, by_name[c.name]))
+    joints = problem.joints
+    for k, name in enumerate(joints.names if joints else ()):
+        assert joints is not None
+        for what, limits, s in (
+            ("upper", joints.tau_max, slopes.tau_max),
+            ("lower", joints.tau_min, slopes.tau_min),
+        ):
+            if name in s:
+                rows.append((f"{what} torque limit of {name}", float(limits[k]), "N·m", s[name]))
+    size = abs(solution.value) or 1.0
+    return Optimum(
+        value=solution.value,
+        unit=UNITS[problem.objective],
+        normal_forces={
+            c.name: float(f) for c, f in zip(problem.contacts, solution.w_OC_C[:, N], strict=True)
+        },
+        active=_active(solution),
+        sensitivities=slopes,
+        influences={
+            name: Influence(value, unit, slope, slope * value / size)
+            for name, value, unit, slope in rows
+            if abs(slope * value) > _ACTIVE * size
+        },
+    )
+
+
+def _active(solution: Solution) -> tuple[str, ...]:
+    problem, joints, active = solution.problem, solution.problem.joints, []
+    f_n = solution.w_OC_C[:, N]
+    unit = float(np.abs(solution.w_OC_C).max())
+    for i, c in enumerate(problem.contacts):
+        if f_n[i] <= _ACTIVE * unit:
+            active.append(f"{c.name} unloaded")
+        elif solution.utilisation[i] >= 1.0 - _ACTIVE:
+            active.append(f"friction of {c.name}")
+        if c.f_n_min > 0.0 and f_n[i] - c.f_n_min <= _ACTIVE * unit:
+            active.append(f"preload of {c.name}")
+        if c.f_n_max - f_n[i] <= _ACTIVE * unit:
+            active.append(f"grip limit of {c.name}")
+    for k, name in enumerate(joints.names if joints else ()):
+        assert joints is not None
+        margin = min(joints.tau_max[k] - solution.tau[k], solution.tau[k] - joints.tau_min[k])
+        if margin <= _ACTIVE * unit:
+            active.append(f"torque limit of {name}")
+    return tuple(active)
+
+
+def _words(change: Change, problem: Problem, gravity: Gravity) -> str:
+    """A change in a few words, with the numbers that it stands for."""
+    kind, factor = change.kind, change.factor
+    if change.outcome is Outcome.ABSENT:
+        return f"no {kind}"
+    if change.outcome is Outcome.NEVER:
+        return {
+            Kind.FRICTION: f"no friction helps (up to {factor:.4g} times)",
+            Kind.TORQUE: "does not help, not even without torque limits",
+            Kind.WEIGHT: "does not help, not even without weight",
+            Kind.GRIP: "does not help, not even without grip limits",
+        }[kind]
+    if change.outcome is Outcome.ALWAYS:
+        if kind is Kind.WEIGHT:
+            return "any weight"
+        return f"down to {factor:.3g} times and less" if factor else "down to nothing"
+    # More friction, torque or grip, or less weight, is what an infeasible problem needs; the other
+    # way round it is what a feasible one bears.
+    needed = (factor > 1.0) is (kind is not Kind.WEIGHT)
+    more, less = ("at least", "at most") if needed else ("up to", "down to")
+    text = f"{more if factor > 1.0 else less} {factor:.4g} times"
+    if kind is Kind.WEIGHT:
+        text += f" ({factor * gravity.weight:.4g} N)"
+    elif kind is Kind.FRICTION:
+        text += _numbers({c.name: factor * c.mu for c in problem.contacts}, "")
+    elif kind is Kind.GRIP:
+        text += _numbers({c.name: factor * c.f_n_max for c in problem.contacts}, " N")
+    return text if math.isfinite(change.confirmed_within) else f"{text} (not confirmed)"
+
+
+def _numbers(values: dict[str, float], unit: str) -> str:
+    """Values by name, those that are equal together."""
+    names: dict[str, list[str]] = {}
+    for name, value in values.items():
+        if math.isfinite(value):
+            names.setdefault(f"{value:.4g}{unit}", []).append(name)
+    return f" ({'; '.join(f'{value} at {and_list(owners)}' for value, owners in names.items())})"

@@ -1,0 +1,209 @@
+"""What can be said of a scenario before anything moves: reach, and forces over the whole path."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from fulcrum.sim.analysis.explain import Explanation, explain
+from fulcrum.sim.analysis.surroundings import Surroundings, surroundings
+from fulcrum.sim.model.grip import GripSchedule
+from fulcrum.sim.model.robot import RobotModel
+from fulcrum.sim.motion.ik import plan_joints
+from fulcrum.sim.motion.joint_path import JointPath, PathError
+from fulcrum.sim.planning.path_problems import PathProblems
+from fulcrum.sim.planning.robust_grip import plan_grip
+from fulcrum.sim.scenario.control import Control
+from fulcrum.sim.scenario.phases import stretched, tilting
+from fulcrum.sim.scenario.scenario import Scenario
+from fulcrum.sim.signals.trace import torque_shares
+from fulcrum.synthesis import (
+    InfeasibleError,
+    InvalidInputError,
+    Objective,
+    Problem,
+    RobustInfeasibleError,
+    Solution,
+    SolverError,
+    Synthesizer,
+    UnboundedError,
+)
+from fulcrum.synthesis.arrays import Array, N
+
+# Steps of the tilt [deg].
+_STEP_DEG = 2.5
+# By how much longer a tilt is tried where speed limits stop it.
+_SLOWER = (1.5, 2.0, 4.0)
+
+
+@dataclass(frozen=True, eq=False)
+class Curves:
+    """What is needed over the tilt; NaN where there are no forces.
+
+    Attributes:
+        tilts_deg: (k,).
+        grip: Normal forces of the hands [N], (k, n).
+        torque: Largest share of a torque limit that is used [-], (k,); NaN without joints.
+        joint: Whose it is, by tilt; empty without joints.
+        used: Largest share of the friction that these forces use [-], (k,).
+        contact: Whose it is, by tilt.
+        least_used: The same of the forces that use as little as can be [-], (k,).
+    """
+
+    tilts_deg: Array
+    grip: Array
+    torque: Array
+    joint: tuple[str, ...]
+    used: Array
+    contact: tuple[str, ...]
+    least_used: Array
+
+    @property
+    def holds(self) -> bool:
+        """Whether there are forces at every tilt."""
+        return bool(np.isfinite(self.used).all())
+
+
+@dataclass(frozen=True, eq=False)
+class Feasibility:
+    """Whether a scenario can be done, and why not.
+
+    Attributes:
+        unreachable: Why the arms cannot follow the path; None if they can.
+        slower: By which factor the tilt would have to last longer, where that alone helps.
+        clearances: Smallest distance of each joint to the ends of its range [rad or m].
+        curves: Forces over the tilt; without joints where the arms cannot follow.
+        grip: The least grip over the tilt, if the controller asks for one.
+        explanation: Why there are no forces, at the first tilt where there are none.
+        surroundings: Whether the object fits what it stands on and what is in its way.
+    """
+
+    unreachable: PathError | None
+    slower: float | None
+    clearances: dict[str, float]
+    curves: Curves
+    grip: GripSchedule | None
+    explanation: Explanation | None
+    surroundings: Surroundings
+
+    @property
+    def feasible(self) -> bool:
+        """Whether arms and forces can do it, and surfaces leave room and bear the object."""
+        fits = not self.surroundings.misfits
+        return fits and self.unreachable is None and self.curves.holds
+
+
+def feasibility(scenario: Scenario, control: Control) -> Feasibility:
+    """Looks at the whole path.
+
+    Args:
+        scenario: The scene.
+        control: Whose margins and grip count.
+    """
+    unreachable, slower, joint_path = None, None, None
+    try:
+        joint_path = plan_joints(scenario)
+    except PathError as error:
+        unreachable, slower = error, _slower(scenario, error)
+    clearances = {}
+    if joint_path is not None:
+        names = RobotModel(scenario).joints
+        clearances = dict(zip(names, joint_path.clearance.tolist(), strict=True))
+    grip = None if joint_path is None else _grip(scenario, control, joint_path)
+    problems = PathProblems(scenario, control, joint_path is not None, joint_path, grip)
+    tilts, synthesizer = problems.tilts(_STEP_DEG), Synthesizer()
+    found = [_solve(problems.problem(tilt), synthesizer) for tilt in tilts.tolist()]
+    curves = _curves(scenario, control, tilts, found, synthesizer)
+    missing = [tilt for tilt, (_, s) in zip(tilts.tolist(), found, strict=True) if s is None]
+    why = explain(problems, missing[0], synthesizer) if missing else None
+    around = surroundings(scenario)
+    return Feasibility(unreachable, slower, clearances, curves, grip, why, around)
+
+
+def _slower(scenario: Scenario, error: PathError) -> float | None:
+    """The least of some factors by which a longer tilt suits the arms; None if none does."""
+    turns = tilting(scenario.phases)
+    if not turns or not any("speed limit" in reason for reason in error.reasons):
+        return None
+    lasts = max(scenario.phases[i].duration_s for i in turns)
+    for factor in _SLOWER:
+        try:
+            plan_joints(replace(scenario, phases=stretched(scenario.phases, factor * lasts)))
+        except (PathError, InvalidInputError):
+            continue
+        return factor
+    return None
+
+
+def _grip(scenario: Scenario, control: Control, joint_path: JointPath) -> GripSchedule | None:
+    """The controller's least grip; None if it asks for none, or if nothing can be held at all."""
+    try:
+        return plan_grip(scenario, control, joint_path)
+    except (RobustInfeasibleError, SolverError):
+        return None
+
+
+def _solve(problem: Problem, synthesizer: Synthesizer) -> tuple[Problem, Solution | None]:
+    """The problem, and its solution if there is one."""
+    try:
+        return problem, synthesizer.solve(problem)
+    except InfeasibleError:
+        return problem, None
+
+
+def _least_used(problem: Problem, synthesizer: Synthesizer) -> float:
+    """The least share of the friction that any forces use [-]; NaN if that has no optimum."""
+    try:
+        margin = replace(problem, objective=Objective.FRICTION_MARGIN)
+        return synthesizer.solve(margin).value
+    except (InfeasibleError, SolverError, UnboundedError, InvalidInputError):
+        return np.nan
+
+
+def _curves(
+    scenario: Scenario,
+    control: Control,
+    tilts: Array,
+    found: list[tuple[Problem, Solution | None]],
+    synthesizer: Synthesizer,
+) -> Curves:
+    contacts, hands = scenario.contact_names, len(scenario.hands)
+    grip, used, least = np.full((len(tilts), hands), np.nan), [], []
+    torque, joint, contact = [], [], []
+    for k, (problem, solution) in enumerate(found):
+        if solution is None:
+            least.append(np.nan)
+            used.append(np.nan)
+            torque.append(np.nan)
+            joint.append("")
+            contact.append("")
+            continue
+        # Of all the friction that is believed to be there.
+        share = control.friction_factor * solution.utilisation
+        grip[k] = solution.w_OC_C[:hands, N]
+        used.append(float(share.max()))
+        contact.append(contacts[int(share.argmax())])
+        least.append(control.friction_factor * _least_used(problem, synthesizer))
+        name, most = _torque(solution)
+        torque.append(most)
+        joint.append(name)
+    return Curves(
+        tilts,
+        grip,
+        np.array(torque),
+        tuple(joint),
+        np.array(used),
+        tuple(contact),
+        np.array(least),
+    )
+
+
+def _torque(solution: Solution) -> tuple[str, float]:
+    """The joint that uses most of its torque limit, and the share [-]."""
+    joints = solution.problem.joints
+    if joints is None:
+        return "", np.nan
+    shares = torque_shares(solution.tau, joints.tau_min, joints.tau_max)
+    worst = int(np.argmax(shares))
+    return joints.names[worst], float(shares[worst])

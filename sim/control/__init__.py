@@ -1,0 +1,1 @@
+"""From measured state to torques: synthesis, drives, reaction, observer, and the guard."""

@@ -1,0 +1,248 @@
+"""The outer loop: from the measured state to the forces that the drives are to make."""
+
+from __future__ import annotations
+
+import time
+from dataclasses import dataclass, replace
+
+from fulcrum.sim.control.drives import Drives
+from fulcrum.sim.control.guard import Supervisor
+from fulcrum.sim.control.health import Health, Sent
+from fulcrum.sim.control.observer import PoseObserver
+from fulcrum.sim.control.replanning import Replanner
+from fulcrum.sim.model.grip import GripSchedule
+from fulcrum.sim.model.inertia import inertial_wrenches
+from fulcrum.sim.model.object_path import object_path
+from fulcrum.sim.model.robot import RobotModel
+from fulcrum.sim.model.statics import Statics
+from fulcrum.sim.motion.clock import PathClock
+from fulcrum.sim.motion.joint_path import JointPath
+from fulcrum.sim.motion.references import References
+from fulcrum.sim.scenario.control import Control
+from fulcrum.sim.scenario.scenario import Scenario
+from fulcrum.sim.signals.event import Event, Mode
+from fulcrum.sim.signals.measurement import Measurement
+from fulcrum.sim.signals.setpoint import Setpoint
+from fulcrum.sim.signals.target import Target
+from fulcrum.sim.world.channel import Channel
+from fulcrum.sim.world.world import NO_DEVIATION
+from fulcrum.synthesis import (
+    InfeasibleError,
+    Problem,
+    Solution,
+    SolverError,
+    Synthesizer,
+    UnboundedError,
+)
+from fulcrum.synthesis.arrays import Array, Mask
+from fulcrum.synthesis.best_effort import BestEffort, best_effort
+
+# Time between looks at the run's health [s].
+_CHECK_S = 0.01
+
+
+@dataclass(eq=False, slots=True)  # one every step, and a frozen one takes thrice as long
+class Command:
+    """What the controller asks of the motors, and why.
+
+    Attributes:
+        tau: Torques within the limits [N·m or N], (l,).
+        saturated: Which torques were cut at their limit, (l,).
+        phase: Index of the phase.
+        mode: What the run is doing.
+        q_ref: Reference angles [rad or m], (l,).
+        tilt_ref, rate_ref: Reference tilt [rad] and its rate [rad/s].
+        w_OC_C: Commanded wrenches on the object in contact axes [N, N·m], (m, 6).
+        synthesis_s: Wall time of this tick's synthesis [s]; 0 where none was due.
+        failed: Whether this tick's synthesis had no solution, so that the last forces, or with best
+            effort those nearest to balance, are applied.
+    """
+
+    tau: Array
+    saturated: Mask
+    phase: int
+    mode: Mode
+    q_ref: Array
+    tilt_ref: float
+    rate_ref: float
+    w_OC_C: Array
+    synthesis_s: float
+    failed: bool
+
+
+class Controller:
+    """Quasi-static force control along the path; the drives hold the last synthesised forces."""
+
+    def __init__(
+        self,
+        scenario: Scenario,
+        control: Control,
+        robot: RobotModel,
+        joint_path: JointPath,
+        channel: Channel | None = None,
+        grip: GripSchedule | None = None,
+        replanner: Replanner | None = None,
+    ) -> None:
+        """Takes over what it believes.
+
+        Args:
+            scenario: The scene.
+            control: The settings.
+            robot: Its model.
+            joint_path: What the drives follow.
+            channel: The wire to the drives; an ideal one if left out.
+            grip: The least normal forces of the hands; the control's preload if left out.
+            replanner: Plans the rest of a planned tilt anew where need be.
+        """
+        self._replanner, self._timestep = replanner, scenario.physics.timestep
+        self._control, schedule = control, joint_path.schedule
+        self._scenario, self._robot, self._path = scenario, robot, object_path(scenario.path)
+        self._references = References(joint_path, self._timestep)
+        self._free, self._held = schedule.free.tolist(), schedule.held.tolist()
+        # Once the grip has been let go for good there is nothing left to be lowered.
+        self._last_held = max(schedule.held.nonzero()[0].tolist(), default=-1)
+        self._statics = Statics(scenario, control, robot, grip)
+        self._synthesizer = Synthesizer()
+        self._drives = Drives(scenario, control, robot)
+        self._channel = channel or Channel(NO_DEVIATION)
+        self._observer = PoseObserver(self._path, control.pose_filter_s)
+        self._clock, self._total_s = PathClock(self._timestep), schedule.total_s
+        self._supervisor = Supervisor(control.guard)
+        self._health = Health(control.guard, scenario, robot, joint_path.start)
+        self._tick, self._check_every = 0, max(1, round(_CHECK_S / self._timestep))
+        # Since when no forces are found, and when a setpoint last arrived, or none was due [s].
+        self._failing_t: float | None = None
+        self._heard_t = 0.0
+        self._q_stop: Array | None = None
+
+    @property
+    def events(self) -> tuple[Event, ...]:
+        """What went wrong so far, and what was done about it."""
+        return tuple(self._supervisor.events)
+
+    def left_s(self, t: float) -> float:
+        """How long the run still takes as things stand at a time [s]; 0 if it has ended."""
+        supervisor, path_t = self._supervisor, t - self._clock.delay
+        if supervisor.mode in (Mode.RUN, Mode.HOLD):
+            return self._total_s - path_t
+        return supervisor.left_s(t, path_t)
+
+    def command(self, measurement: Measurement) -> Command:
+        """The torques for the next step."""
+        supervisor, clock, drives = self._supervisor, self._clock, self._drives
+        t, seen, mode = measurement.t, self._health.accept(measurement), supervisor.mode
+        path_t = clock.at(t, supervisor.rate)
+        target = self._references.at(path_t)
+        if clock.rate != 1.0 or clock.change != 0.0:
+            target = target.on_clock(clock.rate, clock.change)
+        if supervisor.stands:
+            self._q_stop = seen.q if self._q_stop is None else self._q_stop
+            target = Target(target.phase, target.tilt, target.grip, self._q_stop, 0.0 * target.qd)
+        synthesis_s, failed, free = 0.0, False, self._free[target.phase]
+        if free:
+            self._failing_t, self._heard_t = None, t
+        if self._tick % self._control.solve_every == 0:
+            drives.update_model(seen.q, target if self._control.inertia else None)
+            if not free and self._health.sees_object(seen):
+                started = time.perf_counter()
+                forces = self._synthesize(seen, target)
+                synthesis_s = time.perf_counter() - started
+                failed = not isinstance(forces, Solution)
+                if forces is not None:
+                    self._failing_t = None
+                elif self._failing_t is None:
+                    self._failing_t = t
+        self._receive(t, path_t)
+        if self._tick % self._check_every == 0:
+            self._check(seen, path_t, target)
+        self._tick += 1
+        share = target.grip * supervisor.grip(t) if self._control.feedforward else 0.0
+        tau, saturated = drives.torques(seen, target, share, self._health.uncontrolled)
+        return Command(
+            tau=tau,
+            saturated=saturated,
+            q_ref=target.q,
+            phase=target.phase,
+            mode=mode,
+            tilt_ref=target.tilt,
+            rate_ref=target.rate,
+            w_OC_C=drives.w_held,
+            synthesis_s=synthesis_s,
+            failed=failed,
+        )
+
+    def _receive(self, t: float, path_t: float) -> None:
+        """Follows a setpoint that has arrived; while lowering without, what held on the way up."""
+        setpoint, lowering = self._channel.receive(t), self._supervisor.mode is Mode.LOWER
+        if setpoint is not None:
+            self._heard_t = t
+            self._drives.follow(setpoint)
+            if not lowering:
+                self._drives.remember(path_t)
+        elif lowering and t - self._heard_t > self._control.guard.silence_s:
+            self._drives.recall(path_t)
+
+    def _check(self, seen: Measurement, path_t: float, target: Target) -> None:
+        drives = self._drives
+        findings = self._health.check(
+            seen,
+            target,
+            Sent(drives.tau, drives.saturated, drives.tau_pull),
+            held=self._held[target.phase],
+            failing_s=0.0 if self._failing_t is None else seen.t - self._failing_t,
+            silent_s=seen.t - self._heard_t,
+        )
+        lowerable, before = target.phase <= self._last_held, self._supervisor.mode
+        self._supervisor.update(seen.t, findings, path_t, lowerable)
+        if self._replanner is not None and target.phase == self._replanner.phase:
+            self._replan(self._replanner, before, seen, target)
+
+    def _replan(
+        self, replanner: Replanner, before: Mode, seen: Measurement, target: Target
+    ) -> None:
+        """Follows the rest of a planned tilt in another timing, where that is due."""
+        anew = None
+        if self._supervisor.mode is Mode.RUN and before is Mode.HOLD:
+            anew, why = replanner.rested(target), "the run goes on"
+        elif self._supervisor.mode is Mode.RUN:
+            anew, why = replanner.caught(target, seen), "the arms have fallen behind"
+        if anew is None:
+            return
+        self._references = References(anew.joint_path, self._timestep)
+        self._total_s = anew.joint_path.schedule.total_s
+        self._clock.set(seen.t, anew.path_t)
+        self._drives.forget(anew.path_t)
+        self._supervisor.note(seen.t, why, "plan anew")
+
+    def _synthesize(self, seen: Measurement, target: Target) -> Solution | BestEffort | None:
+        """Sends the forces for a measured pose, if there are any."""
+        pose = self._observer.update(seen.t, seen.p_WO, seen.quat_WO, target.tilt)
+        problem = self._statics.problem(*pose, target.tilt)
+        if self._control.inertia:
+            problem = self._moving(problem, target)
+        forces = self._solve(problem)
+        if forces is not None:
+            assert problem.joints is not None
+            tau_f = forces.tau - problem.joints.tau_g
+            setpoint = Setpoint(tau_f, forces.w_OC_C, problem.joints.J_C)
+            self._channel.send(seen.t, setpoint)
+        return forces
+
+    def _moving(self, problem: Problem, target: Target) -> Problem:
+        """The problem in motion: what accelerates object and robot counts as load."""
+        assert problem.joints is not None
+        w_a, w_b = inertial_wrenches(self._scenario, self._path, target.tilt)
+        w_ext_O = problem.w_ext_O - target.acceleration * w_a - target.rate**2 * w_b
+        tau_g = self._drives.tau_g + self._robot.damping * target.qd
+        return replace(problem, w_ext_O=w_ext_O, joints=replace(problem.joints, tau_g=tau_g))
+
+    def _solve(self, problem: Problem) -> Solution | BestEffort | None:
+        try:
+            return self._synthesizer.solve(problem)
+        except (InfeasibleError, UnboundedError, SolverError):
+            if not self._control.best_effort:
+                return None
+        try:
+            return best_effort(problem)
+        except (InfeasibleError, SolverError):
+            return None

@@ -1,0 +1,165 @@
+r"""The drives: joint impedance at the physics' rate along the path, and the forces last asked for.
+
+.. math:: \tau = g(q) + \left[ M \ddot q_d + C(q, \dot q_d) \dot q_d \right]
+                 + s\,J^T f^* + D \dot q_d
+                 + M(q) \left( \omega^2 (q_d - q) + 2 \omega (\dot q_d - \dot q) \right)
+
+with :math:`f^*` the forces of the last setpoint that has arrived, s the share of grip that the
+schedule asks for and D the joints' viscous friction; what is in brackets only where the control
+counts with inertia. The mass matrix M gives every joint, light or heavy, the same bandwidth
+:math:`\omega`: damping that is explicit in time stays stable on light wrists. A joint whose encoder
+is dead has no impedance. Whatever comes in, what goes out is finite and within the limits.
+
+A stiff impedance would also oppose the squeeze, by which the hands sink into what they hold. So
+that the force there is the one asked for, it leaves the squeeze to the feed-forward: with J_n the
+Jacobian of the hands' normal directions and e the unit vector along their commanded normal forces,
+M above becomes
+
+.. math:: M - J_n^T e\, e^T \Lambda J_n, \qquad \Lambda = (J_n M^{-1} J_n^T)^{-1}
+
+which takes away the normal forces along e that :math:`M \ddot q` means to hands that cannot move
+along their normals (Khatib 1987, the operational space formulation).
+"""
+
+from __future__ import annotations
+
+import math
+from bisect import bisect_left, bisect_right
+
+import numpy as np
+
+from fulcrum.sim.control.reaction import GripReaction
+from fulcrum.sim.model.robot import RobotModel
+from fulcrum.sim.scenario.control import Control
+from fulcrum.sim.scenario.scenario import Scenario
+from fulcrum.sim.signals.measurement import Measurement
+from fulcrum.sim.signals.setpoint import Setpoint
+from fulcrum.sim.signals.target import Target
+from fulcrum.synthesis.arrays import Array, Mask, N
+
+
+class Drives:
+    """Turns measured joint states into torques within the limits.
+
+    Attributes:
+        tau_g: Torques that hold the robot up, and where inertia counts also make its motion, as of
+            the last update of the model (l,).
+        tau: Torques that were last asked for, within the limits (l,).
+        saturated: Which of them were cut at their limit, (l,).
+        tau_pull: Torques with which the impedance last pulled the joints to their path (l,).
+        w_held: Wrenches on the object that the last torques were to make [N, N·m], (m, 6).
+    """
+
+    def __init__(self, scenario: Scenario, control: Control, robot: RobotModel) -> None:
+        """Takes over the model of the robot, which whoever updates it shares."""
+        self._robot, self._control = robot, control
+        joints = len(robot.joints)
+        self.tau_g, self.tau_pull, self.tau = np.zeros((3, joints))
+        self.saturated = np.zeros(joints, bool)
+        contacts, hands = len(scenario.contact_names), len(scenario.hands)
+        none = np.zeros(joints), np.zeros((contacts, 6)), np.zeros((hands, 6, joints))
+        self._setpoint = Setpoint(*none)
+        self._share, self._tau_held, self.w_held = math.nan, self.tau_g, self._setpoint.w_OC_C
+        # Deviations of angles and speeds, and torques per each of them: both terms in one product.
+        self._deviations, self._gains = np.zeros(2 * joints), np.zeros((joints, 2 * joints))
+        self._q_off, self._qd_off = self._deviations[:joints], self._deviations[joints:]
+        self._reaction, self._extra = GripReaction(scenario, control, robot), 0.0
+        self._update_s = control.solve_every * scenario.physics.timestep
+        # Setpoints by path time, in the order of both.
+        self._times: list[float] = []
+        self._memory: list[Setpoint] = []
+
+    def update_model(self, q: Array, target: Target | None = None) -> None:
+        """Takes over joint angles [rad or m], (l,), for gravity and gains until the next update.
+
+        Args:
+            q: The angles.
+            target: Whose motion is to be made, inertia and all; None where it does not count.
+        """
+        self._robot.update(q)
+        omega, mass_matrix = self._control.bandwidth, self._robot.mass_matrix()
+        share, pull, dt = self._share, self.tau_pull, self._update_s
+        self._extra = self._reaction.update(
+            mass_matrix, self._setpoint, pull, self.tau_g, share, dt
+        )
+        if self._control.yielding_squeeze:
+            mass_matrix = self._without_squeeze(mass_matrix)
+        stiffness, damping = self._reaction.braced(mass_matrix, omega)
+        self._gains[:, : len(q)], self._gains[:, len(q) :] = stiffness, damping
+        self.tau_g = self._robot.gravity()
+        if target is not None and target.qdd is not None:
+            self.tau_g = self.tau_g + self._robot.motion_torques(target.qd, target.qdd)
+        self._share = math.nan  # what was held is to be found anew
+
+    def _without_squeeze(self, mass_matrix: Array) -> Array:
+        """The mass matrix less its part along the squeeze that is asked for."""
+        J_n = self._setpoint.J_C[:, N]
+        f_n = self._setpoint.w_OC_C[: len(J_n), N]
+        squeeze = float(np.linalg.norm(f_n))
+        if self._share == 0.0 or squeeze == 0.0:
+            return mass_matrix
+        e = f_n / squeeze
+        inertia = np.linalg.inv(J_n @ np.linalg.solve(mass_matrix, J_n.T))
+        return mass_matrix - np.outer(e @ J_n, e @ inertia @ J_n)
+
+    def follow(self, setpoint: Setpoint) -> None:
+        """Takes over a setpoint that has arrived."""
+        self._setpoint = setpoint
+        self._share = math.nan
+
+    def remember(self, path_t: float) -> None:
+        """Keeps the present setpoint as that of a path time [s] after all that are kept."""
+        self._times.append(path_t)
+        self._memory.append(self._setpoint)
+
+    def forget(self, path_t: float) -> None:
+        """Drops what is kept of path times [s] from this one on."""
+        kept = bisect_left(self._times, path_t)
+        del self._times[kept:], self._memory[kept:]
+
+    def recall(self, path_t: float) -> None:
+        """Takes over the setpoint that held at a path time [s], if any is kept."""
+        if self._memory:
+            setpoint = self._memory[max(0, bisect_right(self._times, path_t) - 1)]
+            if setpoint is not self._setpoint:
+                self.follow(setpoint)
+
+    def torques(
+        self, measurement: Measurement, target: Target, share: float, dead: Mask | None = None
+    ) -> tuple[Array, Mask]:
+        """Torques [N·m or N], (l,), and which of them were cut at their limit.
+
+        Args:
+            measurement: The present state of the joints.
+            target: Where they should be.
+            share: Of the setpoint's forces that is applied [-].
+            dead: Joints without impedance, (l,); None if there are none.
+        """
+        np.subtract(target.q, measurement.q, self._q_off)
+        np.subtract(target.qd, measurement.qd, self._qd_off)
+        if dead is not None:
+            self._q_off[dead] = self._qd_off[dead] = 0.0
+        pull = self._gains.dot(self._deviations)
+        if dead is not None:
+            pull[dead] = 0.0
+        self.tau_pull = pull
+        if share != self._share:
+            self._hold(share)
+        robot = self._robot
+        tau = pull + robot.damping * target.qd
+        tau += self._tau_held
+        if math.isnan(tau.dot(tau)):  # a limit cuts infinities, but lets NaN pass
+            tau = np.where(np.isnan(tau), self.tau, tau)
+        self.tau = np.minimum(np.maximum(tau, robot.tau_min), robot.tau_max)
+        self.saturated = self.tau != tau
+        return self.tau, self.saturated
+
+    def _hold(self, share: float) -> None:
+        """Finds what holds robot and object until the next setpoint or change of share."""
+        self._share = share
+        self._tau_held = self.tau_g + share * self._setpoint.tau_f
+        self.w_held = share * self._setpoint.w_OC_C
+        if self._extra > 0.0:
+            squeeze = share * self._extra * self._reaction.direction
+            self._tau_held += squeeze @ self._setpoint.J_C[:, N]
+            self.w_held[: len(squeeze), N] += squeeze

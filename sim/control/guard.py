@@ -1,0 +1,157 @@
+"""When a run is held, lowered or stopped, by a stated rule.
+
+=====================================  ==================================  =========================
+cause                                  while it lasts                      if it persists
+=====================================  ==================================  =========================
+no setpoint arrives                    hold, then go on                    lower
+the synthesis finds no forces          hold, then go on                    lower
+the object's pose is missing, frozen   hold, then go on                    lower
+the tilt is not followed               hold, then go on                    lower
+a joint is off its path                hold, then go on                    lower
+a torque is cut at its limit           hold, then go on                    lower
+an encoder gives nothing, or freezes   without impedance at that joint     stop
+a motor does not make its torque                                           stop, let go
+the object is not where the hands are                                      stop, let go
+lowering is blocked                                                        stop
+=====================================  ==================================  =========================
+
+To hold is to let path time stand still; forces and impedance go on. To lower is to let it run
+backwards: the object goes down the way it came, the hands let go of it at the bottom and withdraw;
+where no new setpoint arrives the drives apply what held the object there on its way up. To stop
+is to hold for good; who lets go lets the contact forces fade. Once the hands have let go at the
+end of a manoeuvre nothing is left to be lowered, and what would lower stops.
+A run ends a second after it was stopped, or the hands have withdrawn.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+from fulcrum.sim.scenario.control import Guard
+from fulcrum.sim.signals.event import Cause, Event, Finding, Mode
+
+# What is left to be seen after the end: that everything rests [s].
+_AFTER_S = 1.0
+# How long all must be well before a held run goes on [s].
+_SETTLED_S = 0.2
+# How long an encoder may be gone: some ten of its samples [s].
+_ENCODER_S = 0.02
+# How long the forces take to fade where the hands let go [s].
+_FADE_S = 0.3
+
+
+RATES = {Mode.RUN: 1.0, Mode.HOLD: 0.0, Mode.LOWER: -1.0, Mode.STOP: 0.0}
+
+
+STOPPING = {Cause.ENCODER: _ENCODER_S, Cause.MOTOR: 0.0, Cause.OBJECT: 0.0}
+_LETTING_GO = (Cause.MOTOR, Cause.OBJECT)
+_BLOCKING = (Cause.SATURATION, Cause.JOINT)
+
+
+class Supervisor:
+    """The state of a run between what is found and what is done about it.
+
+    Attributes:
+        mode: What the run is doing.
+        events: What has happened so far.
+        stands: Whether the arms are to hold where they were when this began, off the path.
+    """
+
+    def __init__(self, settings: Guard) -> None:
+        self._settings = settings
+        self.mode = Mode.RUN
+        self.events: list[Event] = []
+        self.stands = False
+        self._since: dict[Cause, float] = {}
+        self._held_from = self._lowered_from = self._last_trouble = 0.0
+        self._held_s = 0.0
+        self._let_go_at = self._ends_at = math.inf
+
+    @property
+    def rate(self) -> float:
+        """Seconds of path per second that the mode asks for [-]."""
+        return RATES[self.mode]
+
+    def grip(self, t: float) -> float:
+        """Share of the grip that is left at a time [s], 1 unless the hands let go [-]."""
+        return max(0.0, min(1.0, 1.0 - (t - self._let_go_at) / _FADE_S))
+
+    def left_s(self, t: float, path_t: float) -> float:
+        """How long a run that is lowered or stopped still takes, at a time and path time [s]."""
+        return self._ends_at - t if math.isfinite(self._ends_at) else path_t + _AFTER_S
+
+    def update(self, t: float, findings: Sequence[Finding], path_t: float, lowerable: bool) -> None:
+        """Takes over what is found at a time.
+
+        Args:
+            t: Time [s].
+            findings: What is found now.
+            path_t: Path time [s].
+            lowerable: Whether the hands have not let go at the end of the manoeuvre.
+        """
+        if self.mode is Mode.RUN and not findings:
+            return
+        found = {finding.cause: finding.text for finding in findings}
+        self._since = {cause: self._since.get(cause, t) for cause in found}
+        if self.mode is Mode.STOP:
+            return
+        for cause, text in found.items():
+            if t - self._since[cause] >= STOPPING.get(cause, math.inf):
+                self._stop(t, text, cause)
+                return
+        if self.mode is Mode.RUN:
+            self._hold(t, next(iter(found.values())))
+        elif self.mode is Mode.HOLD:
+            self._wait(t, found, lowerable)
+        else:
+            self._lower(t, found, path_t)
+
+    def note(self, t: float, text: str, reaction: str) -> None:
+        """Adds what was done by somebody else to the events."""
+        self.events.append(Event(t, text, reaction))
+
+    def _hold(self, t: float, text: str) -> None:
+        self._enter(Mode.HOLD, t, text)
+        self._held_from = self._last_trouble = t
+
+    def _wait(self, t: float, found: dict[Cause, str], lowerable: bool) -> None:
+        """Goes on once all has been well for a while, and lowers if that takes too long."""
+        if found:
+            self._last_trouble = t
+        held_s = t - self._held_from
+        if t - self._last_trouble >= _SETTLED_S:
+            self._held_s += held_s
+            self._enter(Mode.RUN, t, f"it passed after {held_s:.2f} s")
+        elif held_s >= self._settings.hold_s or self._held_s + held_s >= self._settings.holds_s:
+            text = next((text for cause, text in found.items() if cause not in STOPPING), None)
+            if text is None:
+                return
+            if lowerable:
+                self._enter(Mode.LOWER, t, text)
+                self._lowered_from = t
+            else:
+                self._stop(t, text)
+
+    def _lower(self, t: float, found: dict[Cause, str], path_t: float) -> None:
+        """Ends at the path's start; stops if a cause lasts that keeps the arms from following."""
+        for cause in _BLOCKING:
+            since = max(self._since.get(cause, math.inf), self._lowered_from)
+            if t - since >= self._settings.lower_s and not math.isfinite(self._ends_at):
+                self._stop(t, f"lowering is blocked, {found[cause]}")
+                return
+        if path_t <= 0.0 and not math.isfinite(self._ends_at):
+            self._ends_at = t + _AFTER_S
+            self.events.append(Event(t, "the hands are back where they began", "end"))
+
+    def _stop(self, t: float, text: str, cause: Cause | None = None) -> None:
+        self._enter(Mode.STOP, t, text)
+        self._ends_at = t + _AFTER_S
+        # Arms that hold the object come to rest on the path; an abrupt stop would shake it off.
+        self.stands = cause is not Cause.ENCODER
+        if cause in _LETTING_GO:
+            self._let_go_at = t
+
+    def _enter(self, mode: Mode, t: float, text: str) -> None:
+        self.mode = mode
+        self.events.append(Event(t, text, mode.name.lower()))

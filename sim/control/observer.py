@@ -1,0 +1,55 @@
+r"""Where the object is: measurements, smoothed along the path that it is on.
+
+Between ticks the estimate is carried on as the path moves; then it goes a share
+:math:`\alpha = 1 - e^{-T / \tau}` of the way to the measurement, T after the last one. What is
+smoothed is the deviation from the path alone, so that the estimate does not lag behind the motion.
+"""
+
+from __future__ import annotations
+
+import math
+
+import mujoco
+import numpy as np
+
+from fulcrum.sim.model.object_path import ObjectPath
+from fulcrum.synthesis.arrays import Array
+
+
+class PoseObserver:
+    """Smooths the measured pose with a time constant; with none it hands it on."""
+
+    def __init__(self, path: ObjectPath, time_constant: float) -> None:
+        """Takes the path, and the time constant [s]."""
+        self._path, self._tau = path, time_constant
+        self._t, self._tilt = math.nan, 0.0
+        self._p_WO, self._quat_WO = np.zeros(3), np.zeros(4)
+        self._rotvec = np.zeros(3)
+
+    def update(self, t: float, p_WO: Array, quat_WO: Array, tilt_ref: float) -> tuple[Array, Array]:
+        """The estimate of position, (3,), and orientation, (4,).
+
+        Args:
+            t: Time of the measurement [s].
+            p_WO: Measured position [m], (3,).
+            quat_WO: Measured orientation, (4,), wxyz.
+            tilt_ref: Where the path's motion is to be [rad].
+        """
+        if self._tau == 0.0:
+            return p_WO, quat_WO
+        if math.isnan(self._t):
+            self._p_WO, self._quat_WO = p_WO, quat_WO
+        else:
+            share = 1.0 - math.exp((self._t - t) / self._tau)
+            self._p_WO, self._quat_WO = self._path.carry(
+                self._tilt, tilt_ref, self._p_WO, self._quat_WO
+            )
+            self._p_WO = self._p_WO + share * (p_WO - self._p_WO)
+            self._correct(quat_WO, share)
+        self._t, self._tilt = t, tilt_ref
+        return self._p_WO, self._quat_WO
+
+    def _correct(self, quat_WO: Array, share: float) -> None:
+        """Turns the estimate a share of the way to a measured orientation."""
+        mujoco.mju_subQuat(self._rotvec, quat_WO, self._quat_WO)  # in the object's axes
+        mujoco.mju_quatIntegrate(self._quat_WO, self._rotvec, share)

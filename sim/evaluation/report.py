@@ -1,0 +1,144 @@
+"""What a run gave: verdict, failures in words, and the numbers that they rest on."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from enum import StrEnum
+
+from fulcrum.sim.signals.event import Event
+
+
+class Verdict(StrEnum):
+    """How a run ended."""
+
+    PASS = "pass"
+    FAIL = "fail"
+    INTERRUPTED = "interrupted"
+
+
+@dataclass(frozen=True)
+class PhaseReport:
+    """A stretch of the run in one phase: its name, and when it was [s]."""
+
+    name: str
+    start_s: float
+    end_s: float
+
+
+@dataclass(frozen=True)
+class TiltReport:
+    """Target, final value and errors of the tilt [deg]."""
+
+    target_deg: float
+    final_deg: float
+    rms_error_deg: float
+    max_error_deg: float
+
+
+@dataclass(frozen=True)
+class ContactReport:
+    """What one contact did while the object was held with full grip.
+
+    Slip, slide, spin and utilisation count until it let go for the first time.
+    ``free_normal_n`` is the largest normal force while no grip was asked for: a hand's impact.
+    """
+
+    kept_fraction: float
+    slip_mm: float
+    slide_mm: float
+    spin_deg: float
+    max_utilisation: float
+    max_normal_n: float
+    force_error_rms_n: float
+    free_normal_n: float
+
+    @property
+    def kept_percent(self) -> float:
+        """Share of the steps at which it was kept [%], rounded down to a decimal: 100 is all."""
+        return math.floor(1e3 * self.kept_fraction) / 10.0
+
+
+@dataclass(frozen=True)
+class TorqueReport:
+    """Largest share of a torque limit, at which joint, and how often a torque was cut."""
+
+    max_utilisation: float
+    joint: str
+    saturated_fraction: float
+
+
+@dataclass(frozen=True)
+class SynthesisReport:
+    """Syntheses (robot quantities, assembly, solve, unpacking): how many, failed, wall time."""
+
+    solves: int
+    failures: int
+    p50_us: float
+    p99_us: float
+
+
+@dataclass(frozen=True)
+class TimingReport:
+    """Simulated time, wall time of loop, monitor and recording, and their ratio."""
+
+    sim_s: float
+    wall_s: float
+    real_time_factor: float
+
+
+@dataclass(frozen=True)
+class Report:
+    """The result of a run, as ``report.json`` holds it; finite numbers only.
+
+    ``phases`` are in the order in which they were come through, backwards while lowering;
+    ``events`` is what the guard found, and what it did.
+    """
+
+    scenario: str
+    controller: str
+    objective: str
+    seed: int
+    verdict: Verdict
+    failures: tuple[str, ...]
+    events: tuple[Event, ...]
+    phases: tuple[PhaseReport, ...]
+    tilt: TiltReport
+    contacts: dict[str, ContactReport]
+    torque: TorqueReport
+    synthesis: SynthesisReport
+    timing: TimingReport
+    recording: str | None
+
+    def _repr_markdown_(self) -> str:
+        from fulcrum.sim.run.notebook import report_markdown
+
+        return report_markdown(self)
+
+
+@dataclass(frozen=True)
+class RunInfo:
+    """What a run was: the parts of the report that are no measurement of the trace.
+
+    Attributes:
+        controller: Name of the controller.
+        objective: What the synthesis minimised.
+        seed: Seed of the run.
+        wall_s: Wall time of loop, monitor and recording [s].
+        interrupted: Whether the run was stopped before its end.
+        error: What ended the run, if something did.
+        recording: Name of the recording's file.
+        collisions: Pairs of geoms that touched against the scenario's will, and when first [s].
+        events: What the guard found, and what it did.
+    """
+
+    controller: str
+    objective: str
+    seed: int
+    wall_s: float
+    interrupted: bool = False
+    error: str | None = None
+    recording: str | None = None
+    collisions: Mapping[tuple[str, str], float] = field(default_factory=dict)
+    events: tuple[Event, ...] = ()

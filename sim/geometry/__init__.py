@@ -1,0 +1,1 @@
+"""What an object is made of: poses, geoms, shapes, meshes, mass and inertia."""

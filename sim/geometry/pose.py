@@ -1,0 +1,56 @@
+"""Where a frame is in its parent frame."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from fulcrum.synthesis import InvalidInputError
+from fulcrum.synthesis.arrays import Array
+from fulcrum.synthesis.checks import vector
+
+Vector = tuple[float, float, float]
+Quaternion = tuple[float, float, float, float]
+
+
+@dataclass(frozen=True)
+class Pose:
+    """A frame's position [m] and orientation (quaternion wxyz) in its parent frame."""
+
+    position: Vector = (0.0, 0.0, 0.0)
+    quaternion: Quaternion = (1.0, 0.0, 0.0, 0.0)
+
+    def __post_init__(self) -> None:
+        vector("pose.position", self.position, 3)
+        vector("pose.quaternion", self.quaternion, 4)
+        # They are normalised where they are used, if their squares are numbers.
+        if not 1e-3 < math.hypot(*self.quaternion) < 1e3:
+            raise InvalidInputError("pose.quaternion", self.quaternion, "a quaternion of length 1")
+
+    @property
+    def rotation(self) -> Rotation:
+        """The orientation."""
+        return Rotation.from_quat(self.quaternion, scalar_first=True)
+
+    def in_parent(self, p: Vector | Array) -> Array:
+        """A point of the frame [m], (3,), in the parent frame."""
+        return np.asarray(self.position) + self.rotation.apply(p)
+
+    def in_frame(self, p: Vector | Array) -> Array:
+        """A point of the parent frame [m], (3,), in the frame."""
+        return self.rotation.inv().apply(p - np.asarray(self.position))
+
+
+def triple(values: Array) -> Vector:
+    """The numbers of an array, (3,)."""
+    x, y, z = values.tolist()
+    return (x, y, z)
+
+
+def wxyz(rotation: Rotation) -> Quaternion:
+    """The quaternion of a rotation."""
+    w, x, y, z = rotation.as_quat(scalar_first=True).tolist()
+    return (w, x, y, z)

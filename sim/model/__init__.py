@@ -1,0 +1,1 @@
+"""The controller's belief as models: scene, robot, contacts, object path, statics, inertia."""

@@ -1,0 +1,115 @@
+"""The scenario's contacts as the synthesis and the monitor see them: parameters and frames."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from fulcrum.sim.geometry.pose import Vector
+from fulcrum.sim.scenario.contacts import Friction
+from fulcrum.sim.scenario.control import Control
+from fulcrum.sim.scenario.scenario import Scenario
+from fulcrum.synthesis import Contact, ContactModel, Role
+from fulcrum.synthesis.arrays import Array
+
+
+def contacts(scenario: Scenario, control: Control) -> tuple[Contact, ...]:
+    """The contacts as the synthesis sees them: friction scaled down, hands preloaded."""
+    hands = tuple(
+        _contact(h.name, Role.HAND, h.friction, control.friction_factor, control.preload, h.f_n_max)
+        for h in scenario.hands
+    )
+    supports = tuple(
+        _contact(s.name, Role.ENVIRONMENT, s.friction, control.friction_factor, 0.0, math.inf)
+        for s in scenario.supports
+    )
+    return hands + supports
+
+
+def true_contacts(scenario: Scenario) -> tuple[Contact, ...]:
+    """The contacts with their full friction and no preload: what the plant is judged by."""
+    return contacts(scenario, Control(friction_factor=1.0, preload=0.0))
+
+
+def shared_places(scenario: Scenario) -> tuple[tuple[int, ...], ...]:
+    """Indices of the supports that hold the same point of the object, for every such point.
+
+    Two surfaces share what holds a point; how, is not for statics to say.
+    """
+    points = [support.p_OP_O for support in scenario.supports]
+    first = len(scenario.hands)
+    places = [
+        tuple(first + i for i, point in enumerate(points) if point == place)
+        for place in dict.fromkeys(points)
+    ]
+    return tuple(place for place in places if len(place) > 1)
+
+
+def _contact(
+    name: str, role: Role, friction: Friction, factor: float, preload: float, f_n_max: float
+) -> Contact:
+    model = ContactModel.PCWF if friction.e_n is None else ContactModel.SFCE
+    return Contact(
+        name=name,
+        role=role,
+        model=model,
+        mu=factor * friction.mu,
+        e_n=friction.e_n or 1.0,
+        f_n_min=preload,
+        f_n_max=f_n_max,
+    )
+
+
+class ContactFrames:
+    """Contact frames of a scenario, hands first: axes (t, o, n) with n into the object.
+
+    Hand contacts are fixed in the object; at supports the point is fixed in the object and the
+    axes in the world.
+
+    Attributes:
+        p_OC_O: Contact points in the object frame [m], (m, 3).
+    """
+
+    def __init__(self, scenario: Scenario) -> None:
+        hands, supports = scenario.hands, scenario.supports
+        self._R_OC = _stack([contact_axes(h.normal_O, h.tangent_O) for h in hands])
+        self._R_WP = _stack([contact_axes(s.normal_W, s.tangent_W) for s in supports])
+        self.p_OC_O = np.array([h.p_OC_O for h in hands] + [s.p_OP_O for s in supports])
+
+    def in_world(self, R_WO: Array) -> Array:
+        """Contact axes in the world, (..., m, 3, 3), for object orientations, (..., 3, 3)."""
+        hands = R_WO[..., None, :, :] @ self._R_OC
+        supports = np.broadcast_to(self._R_WP, (*R_WO.shape[:-2], *self._R_WP.shape))
+        return np.concatenate([hands, supports], axis=-3)
+
+    def in_object(self, R_WO: Array) -> Array:
+        """Contact axes in the object's, (m, 3, 3), for an orientation of the object, (3, 3)."""
+        return np.concatenate([self._R_OC, R_WO.T @ self._R_WP])
+
+    def points(self, R_WO: Array, p_WO: Array) -> Array:
+        """Contact points in the world [m], (m, 3), for a pose of the object."""
+        return p_WO + self.p_OC_O.dot(R_WO.T)
+
+
+def rotations(quaternions: Array) -> Array:
+    """Rotation matrices, (..., 3, 3), of quaternions wxyz, (..., 4)."""
+    flat = Rotation.from_quat(quaternions.reshape(-1, 4), scalar_first=True).as_matrix()
+    return flat.reshape(*quaternions.shape[:-1], 3, 3)
+
+
+def contact_axes(normal: Vector, tangent: Vector) -> Array:
+    """Axes (t, o, n) of a contact as columns, (3, 3), in those of its normal and tangent."""
+    n, t = np.asarray(normal, float), np.asarray(tangent, float)
+    return np.column_stack([t, np.cross(n, t), n])
+
+
+def across(vector: Array, normal: Array) -> Array:
+    """The part of a vector that is across a unit normal, made a unit vector, (3,) each."""
+    part = vector - vector.dot(normal) * normal
+    return part / np.linalg.norm(part)
+
+
+def _stack(matrices: list[Array]) -> Array:
+    return np.array(matrices).reshape(-1, 3, 3)

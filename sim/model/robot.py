@@ -1,0 +1,197 @@
+"""The controller's belief about the robots: a Pinocchio model of their arms, hands and limits.
+
+The model is read off the nominal scene, so that hands, locked joints and the robots' places need no
+second description; that they are the official robots is tested against the official URDF.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import mujoco
+import numpy as np
+import pinocchio as pin
+
+from fulcrum.assets import velocity_limits
+from fulcrum.sim.model.scene import compose, joint_ranges, tip_geom, tip_site
+from fulcrum.sim.scenario.scenario import Scenario
+from fulcrum.synthesis import InvalidInputError, Joints
+from fulcrum.synthesis.arrays import Array
+
+
+class RobotModel:
+    """Kinematics, gravity and limits of the driven joints, in the order of the scene's motors.
+
+    Attributes:
+        joints: Names of the l driven joints.
+        q_min, q_max: Joint ranges [rad or m], (l,).
+        qd_max: Speed limits [rad/s or m/s], (l,).
+        tau_min, tau_max: Torque limits [N·m or N], (l,).
+        damping: Viscous joint friction [N·m·s/rad], (l,).
+        start_deviation: Standard deviation of the start posture [rad or m], (l,).
+        tip_radii: Of the hands' tips [m], (n,).
+    """
+
+    def __init__(self, scenario: Scenario) -> None:
+        scene = compose(scenario).compile()
+        drives = [scene.actuator(i) for i in range(scene.nu)]
+        indices = [int(drive.trnid[0]) for drive in drives]
+        self.joints = tuple(scene.joint(i).name for i in indices)
+        self.q_min, self.q_max = joint_ranges(scene)[indices].T.copy()
+        speeds = velocity_limits(scene)
+        self.qd_max = np.array([speeds[name] for name in self.joints])
+        self.tau_min, self.tau_max = np.array([drive.ctrlrange for drive in drives]).T.copy()
+        self.damping = scene.dof_damping[scene.jnt_dofadr[indices]].copy()
+
+        self.start_deviation = np.array([scenario.start_deviation[name] for name in self.joints])
+
+        self._model = pinocchio_model(scene)
+        # The second, for motion, leaves the first as of the last update.
+        self._data, self._moving = self._model.createData(), self._model.createData()
+        # Pinocchio may order joints otherwise; every vector here is in the order of the motors.
+        self._order = np.array(
+            [self._model.joints[self._model.getJointId(name)].idx_v for name in self.joints]
+        )
+        # Where in Pinocchio's mass matrix, of which only the upper triangle counts, ours is.
+        first = np.minimum.outer(self._order, self._order)
+        second = np.maximum.outer(self._order, self._order)
+        self._mass_entries = first * self._model.nv + second
+        self._q = np.zeros(self._model.nq)
+        self._tau_g = np.zeros(len(self.joints))
+        tips = [self._frame(tip_site(hand)) for hand in scenario.hands]
+        self._tip_joints = [int(self._model.frames[tip].parentJoint) for tip in tips]
+        self._tip_places = [self._model.frames[tip].placement.translation.copy() for tip in tips]
+        self.tip_radii = np.array([scene.geom(tip_geom(h)).size[0] for h in scenario.hands])
+
+    def _frame(self, name: str) -> int:
+        if not self._model.existFrame(name):
+            frames = ", ".join(frame.name for frame in self._model.frames)
+            raise ValueError(f"frame: got {name!r}; valid is one of {frames}.")
+        return int(self._model.getFrameId(name))
+
+    def update(self, q: Array) -> None:
+        """Takes over joint angles [rad or m], (l,), for all quantities asked for next."""
+        self._q[self._order] = q
+        pin.computeJointJacobians(self._model, self._data, self._q)
+        g = pin.computeGeneralizedGravity(self._model, self._data, self._q)
+        self._tau_g = g.take(self._order)
+
+    def gravity(self) -> Array:
+        """Torque that holds the robot up against gravity [N·m or N], (l,)."""
+        return self._tau_g
+
+    def tips(self) -> Array:
+        """Centres of the hands' tips in the world [m], (n, 3), at the last updated angles."""
+        places = zip(self._tip_joints, self._tip_places, strict=True)
+        return np.array([self._data.oMi[joint].act(place) for joint, place in places])
+
+    def mass_matrix(self) -> Array:
+        """Joint-space inertia [kg m^2 or kg], (l, l)."""
+        return pin.crba(self._model, self._data, self._q).take(self._mass_entries)
+
+    def inertial_torques(self, slope: Array, curvature: Array) -> tuple[Array, Array]:
+        r"""What motion along joint angles q(s) costs, at the last updated angles.
+
+        Args:
+            slope: q' [rad or m], (l,).
+            curvature: q'', (l,).
+
+        Returns:
+            :math:`M q'` and :math:`M q'' + C(q, q') q'`, (l,) each: torques per :math:`\ddot s` and
+            per :math:`\dot s^2`, without viscous friction.
+        """
+        return self.motion_torques(np.zeros_like(slope), slope), self.motion_torques(
+            slope, curvature
+        )
+
+    def motion_torques(self, qd: Array, qdd: Array) -> Array:
+        r""":math:`M \ddot q + C(q, \dot q) \dot q` [N·m or N], (l,), at the last updated angles."""
+        speeds, accelerations = np.zeros((2, self._model.nv))
+        speeds[self._order], accelerations[self._order] = qd, qdd
+        tau = pin.rnea(self._model, self._moving, self._q, speeds, accelerations)
+        return tau.take(self._order) - self._tau_g
+
+    def contact_jacobians(self, p_WC: Array, R_WC: Array) -> Array:
+        """Jacobians of the hands' points at the contacts, in contact axes.
+
+        Args:
+            p_WC: Contact points in the world [m], (n, 3).
+            R_WC: Contact axes in the world, (n, 3, 3).
+
+        Returns:
+            (n, 6, l): twist, linear part first, of the point of each hand that is at its contact.
+        """
+        J_C = np.empty((len(self._tip_joints), 6, len(self.joints)))
+        for i, joint in enumerate(self._tip_joints):
+            # The contact as a frame that the tip's joint carries along.
+            X_JC = self._data.oMi[joint].actInv(pin.SE3(R_WC[i], p_WC[i]))
+            J = pin.getFrameJacobian(self._model, self._data, joint, X_JC, pin.ReferenceFrame.LOCAL)
+            J.take(self._order, axis=1, out=J_C[i], mode="clip")
+        return J_C
+
+    def statics(self, p_WC: Array, R_WC: Array) -> Joints:
+        """The joints' part of the synthesis problem at the last updated angles."""
+        return Joints(
+            names=self.joints,
+            J_C=self.contact_jacobians(p_WC, R_WC),
+            tau_g=self.gravity(),
+            tau_min=self.tau_min,
+            tau_max=self.tau_max,
+        )
+
+
+def pinocchio_model(scene: mujoco.MjModel) -> pin.Model:
+    """Pinocchio model of all bodies of a compiled scene that hang on hinges and slides.
+
+    Bodies with a free joint (the object) are left out. Sites become frames of their names.
+
+    Raises:
+        InvalidInputError: A joint is neither a hinge nor a slide.
+    """
+    model = pin.Model()
+    model.gravity.linear = scene.opt.gravity
+    joint_of = {0: 0}
+    X_JB = {0: pin.SE3.Identity()}
+    for body in range(1, scene.nbody):
+        parent = int(scene.body_parentid[body])
+        first, count = int(scene.body_jntadr[body]), int(scene.body_jntnum[body])
+        own = range(first, first + count)
+        free = mujoco.mjtJoint.mjJNT_FREE
+        if parent not in joint_of or any(scene.jnt_type[j] == free for j in own):
+            continue
+        joint = joint_of[parent]
+        placement = X_JB[parent] * _pose(scene.body_pos[body], scene.body_quat[body])
+        for j in own:
+            anchor = pin.SE3(np.eye(3), scene.jnt_pos[j])
+            hinge = scene.jnt_type[j] == mujoco.mjtJoint.mjJNT_HINGE
+            kind = pin.JointModelRevoluteUnaligned if hinge else pin.JointModelPrismaticUnaligned
+            name = scene.joint(j).name
+            if scene.jnt_type[j] == mujoco.mjtJoint.mjJNT_BALL:
+                raise InvalidInputError(f"joint {name}", "a ball joint", "a hinge or a slide")
+            joint = model.addJoint(joint, kind(scene.jnt_axis[j]), placement * anchor, name)
+            model.armature[model.joints[joint].idx_v] = scene.dof_armature[scene.jnt_dofadr[j]]
+            placement = anchor.inverse()
+        joint_of[body], X_JB[body] = joint, placement
+        model.appendBodyToJoint(
+            joint,
+            pin.Inertia(
+                float(scene.body_mass[body]), np.zeros(3), np.diag(scene.body_inertia[body])
+            ),
+            placement * _pose(scene.body_ipos[body], scene.body_iquat[body]),
+        )
+        _add_frame(model, joint, placement, scene.body(body).name)
+    for site in range(scene.nsite):
+        body = int(scene.site_bodyid[site])
+        if body in joint_of:
+            placement = X_JB[body] * _pose(scene.site_pos[site], scene.site_quat[site])
+            _add_frame(model, joint_of[body], placement, scene.site(site).name)
+    return model
+
+
+def _add_frame(model: pin.Model, joint: int, placement: pin.SE3, name: str) -> None:
+    model.addFrame(pin.Frame(name, joint, placement, pin.FrameType.OP_FRAME))
+
+
+def _pose(position: Sequence[float] | Array, quaternion_wxyz: Sequence[float] | Array) -> pin.SE3:
+    w, x, y, z = quaternion_wxyz
+    return pin.SE3(pin.Quaternion(w, x, y, z).normalized().matrix(), np.asarray(position, float))

@@ -1,0 +1,298 @@
+"""Composes a MuJoCo scene from a scenario's data: robots, hands, object, environment, contacts."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from enum import StrEnum
+from typing import Any
+
+import mujoco
+import numpy as np
+from numpy.typing import NDArray
+
+from fulcrum.assets.mjcf import LOOKS
+from fulcrum.assets.models import hand_spec, robot_spec
+from fulcrum.assets.packages import ModelError
+from fulcrum.sim.geometry.geom import Geom
+from fulcrum.sim.geometry.mesh import check_contacts, read_mesh
+from fulcrum.sim.geometry.object import GRAVITY
+from fulcrum.sim.model.object_path import check_supports
+from fulcrum.sim.scenario.contacts import Friction, Hand
+from fulcrum.sim.scenario.robot import Robot
+from fulcrum.sim.scenario.scenario import Scenario
+from fulcrum.synthesis import InvalidInputError
+
+# Solver tolerance of both the main and the noslip solver; tight, for runs are compared bit by bit.
+_SOLVER_TOLERANCE = 1e-10
+
+_GEOM_TYPES = {
+    kind: getattr(mujoco.mjtGeom, f"mjGEOM_{kind.upper()}")
+    for kind in ("plane", "sphere", "capsule", "ellipsoid", "cylinder", "box", "mesh")
+}
+
+
+class ObjectMotion(StrEnum):
+    """Whether physics moves the object, or whoever poses it (inverse kinematics)."""
+
+    FREE = "free"
+    POSED = "posed"
+
+
+def compose(scenario: Scenario, motion: ObjectMotion = ObjectMotion.FREE) -> mujoco.MjSpec:
+    """The scene as an editable specification.
+
+    Raises:
+        InvalidInputError: The scenario names a joint, mount, part of a hand or geom type that does
+            not exist, or a start angle outside its joint's range, or MuJoCo refuses the scene.
+    """
+    check_contacts(scenario)
+    check_supports(scenario)
+    spec = _robots(scenario)
+    for hand in scenario.hands:
+        _add_hand(spec, hand)
+    spec.modelname = scenario.name
+    _set_options(spec, scenario)
+    for geom in scenario.environment:
+        _add_geom(spec, spec.worldbody, geom)
+    _add_object(spec, scenario, motion)
+    if motion is ObjectMotion.FREE:
+        _add_pairs(spec, scenario)
+    scene = _compiled(spec)
+    if motion is ObjectMotion.FREE:
+        for first, second in unwanted_pairs(scenario, scene):
+            spec.add_pair(geomname1=first, geomname2=second)
+    _add_view(spec, scenario)
+    return spec
+
+
+def _compiled(spec: mujoco.MjSpec) -> mujoco.MjModel:
+    try:
+        return spec.copy().compile()
+    except ValueError as error:
+        given = " ".join(str(error).split())
+        raise InvalidInputError("scene", given, "one that MuJoCo compiles") from None
+
+
+def hand_body(hand: Hand) -> str:
+    """Name of the body of a hand."""
+    return f"{hand.name}_pad"
+
+
+def tip_geom(hand: Hand) -> str:
+    """Name of the geom with which a hand touches."""
+    return f"{hand.name}_tip"
+
+
+def tip_site(hand: Hand) -> str:
+    """Name of the site at the centre of a hand's tip."""
+    return f"{hand.name}_tip_center"
+
+
+def unwanted_pairs(scenario: Scenario, scene: mujoco.MjModel) -> list[tuple[str, str]]:
+    """Pairs of geoms that must not touch: moving links against solid object and environment."""
+    surroundings = {g.name: g for g in (*scenario.object.geoms, *scenario.environment)}
+    touching = {(tip_geom(hand), hand.geom) for hand in scenario.hands}
+    geoms = [scene.geom(g) for g in range(scene.ngeom)]
+    links = [g.name for g in geoms if scene.body_weldid[g.bodyid[0]] != 0 and is_solid(g)]
+    return [
+        (link, other)
+        for link in links
+        for other in surroundings
+        if link not in surroundings and (link, other) not in touching and surroundings[other].solid
+    ]
+
+
+def is_solid(geom: Any) -> bool:
+    """Whether a compiled scene's geom may touch others, rather than only show what a link is."""
+    return int(geom.group[0]) != LOOKS
+
+
+def joint_ranges(scene: mujoco.MjModel) -> NDArray[np.float64]:
+    """(njnt, 2) lower and upper limits of a scene's joints [rad or m]; infinite without limits."""
+    limited = scene.jnt_limited[:, None].astype(bool)
+    return np.where(limited, scene.jnt_range, [-np.inf, np.inf])
+
+
+def _set_options(spec: mujoco.MjSpec, scenario: Scenario) -> None:
+    physics, option = scenario.physics, spec.option
+    option.timestep = physics.timestep
+    option.gravity = [0.0, 0.0, -GRAVITY]
+    option.cone = mujoco.mjtCone.mjCONE_ELLIPTIC
+    option.integrator = mujoco.mjtIntegrator.mjINT_IMPLICITFAST
+    option.jacobian = mujoco.mjtJacobian.mjJAC_DENSE
+    option.impratio = physics.impratio
+    option.noslip_iterations = physics.noslip_iterations
+    option.tolerance = option.noslip_tolerance = _SOLVER_TOLERANCE
+
+
+def _robots(scenario: Scenario) -> mujoco.MjSpec:
+    """All robots; MuJoCo attaches under a prefix only, so those that have one join the other."""
+    spec = mujoco.MjSpec()
+    for robot in sorted(scenario.robots, key=lambda robot: robot.prefix != ""):
+        own = _robot(robot)
+        if robot.prefix:
+            own.default.name = "robot"  # the main defaults of hands are called "main", too
+            spec.attach(own, prefix=robot.prefix, frame=spec.worldbody.add_frame())
+        else:
+            spec = own
+    return spec
+
+
+def _robot(robot: Robot) -> mujoco.MjSpec:
+    """One robot at its base, with motors at the driven joints and the others locked."""
+    spec = _read(f"{robot.label}.model", robot_spec, robot.model)
+    _check_joints(spec, robot)
+    for actuator in list(spec.actuators):
+        name = actuator.target
+        if name not in robot.posture:
+            spec.delete(actuator)
+            continue
+        low, high = actuator.ctrlrange
+        limit = robot.torque_limits.get(name, math.inf)
+        if low == high == 0.0:  # the model states none
+            low, high = -math.inf, math.inf
+        low, high = max(low, -limit), min(high, limit)
+        if not high > low > -math.inf:
+            field = f"{robot.label}.torque_limits.{name}"
+            raise InvalidInputError(field, "none, here or in the model", "a number > 0 [N m or N]")
+        actuator.ctrlrange = [low, high]
+    for joint in list(spec.joints):
+        if joint.name not in robot.posture:
+            spec.delete(joint)
+            continue
+        stated = [speed for speed in [*joint.userdata][:1] if 0.0 < speed < math.inf]
+        speeds = [*stated, *(s for n, s in robot.speed_limits.items() if n == joint.name)]
+        if not speeds:
+            field = f"{robot.label}.speed_limits.{joint.name}"
+            valid = "a number > 0 [rad/s or m/s]"
+            raise InvalidInputError(field, "none, here or in the model", valid)
+        joint.userdata = [min(speeds)]
+    base = robot.base
+    for root in spec.worldbody.bodies:
+        position, quaternion = np.zeros(3), np.zeros(4)
+        mujoco.mju_mulPose(
+            position, quaternion, base.position, base.quaternion, root.pos, root.quat
+        )
+        root.pos, root.quat = position, quaternion
+    return spec
+
+
+def _read(field: str, read: Callable[[str], mujoco.MjSpec], model: str) -> mujoco.MjSpec:
+    try:
+        return read(model)
+    except ModelError as error:
+        raise InvalidInputError(field, error.given, error.valid) from None
+
+
+def _check_joints(spec: mujoco.MjSpec, robot: Robot) -> None:
+    """Refuses joints that do not exist, and start angles outside a joint's range."""
+    model = spec.copy().compile()
+    known = [name for j in range(model.njnt) if (name := model.joint(j).name)]
+    for field in ("posture", "torque_limits", "speed_limits"):
+        for name in getattr(robot, field):
+            if name not in known:
+                valid = f"one of {', '.join(known)}"
+                raise InvalidInputError(f"{robot.label}.{field}", name, valid)
+    for name, angle in robot.posture.items():
+        low, high = model.joint(name).range
+        if model.joint(name).limited[0] and not low <= angle <= high:
+            valid = f"in [{low:g}, {high:g}]"
+            raise InvalidInputError(f"{robot.label}.posture.{name}", angle, valid)
+
+
+def _add_hand(spec: mujoco.MjSpec, hand: Hand) -> None:
+    mount = spec.body(hand.mount)
+    if mount is None:
+        bodies = ", ".join(body.name for body in spec.bodies)
+        raise InvalidInputError(f"{hand.name}.mount", hand.mount, f"one of {bodies}")
+    model = _read(f"{hand.name}.model", hand_spec, hand.model)
+    for kind, part in (("body", "pad"), ("geom", "tip"), ("site", "tip_center")):
+        if getattr(model, kind)(part) is None:
+            raise InvalidInputError(f"{hand.name}.model", hand.model, f"one with a {kind} {part}")
+    frame = mount.add_frame(pos=hand.mount_pose.position, quat=hand.mount_pose.quaternion)
+    frame.attach_body(model.body("pad"), f"{hand.name}_", "")
+
+
+def _add_geom(spec: mujoco.MjSpec, body: mujoco.MjsBody, geom: Geom) -> None:
+    if geom.kind not in _GEOM_TYPES:
+        raise InvalidInputError(f"{geom.name}.kind", geom.kind, f"one of {', '.join(_GEOM_TYPES)}")
+    shape: dict[str, Any] = {"size": [*geom.size, 0.0, 0.0][:3]}
+    if geom.file is not None:
+        read = read_mesh(f"{geom.name}.file", geom.file, geom.size)
+        spec.add_mesh(name=geom.name, uservert=read.vertices.ravel(), userface=read.faces.ravel())
+        shape = {"meshname": geom.name}
+    body.add_geom(
+        name=geom.name,
+        type=_GEOM_TYPES[geom.kind],
+        **shape,
+        pos=geom.pose.position,
+        quat=geom.pose.quaternion,
+        rgba=geom.rgba,
+        mass=0.0,
+        contype=0,
+        conaffinity=0,
+    )
+
+
+def _add_object(spec: mujoco.MjSpec, scenario: Scenario, motion: ObjectMotion) -> None:
+    thing, start = scenario.object, scenario.path.start
+    body = spec.worldbody.add_body(
+        name=thing.name,
+        pos=start.position,
+        quat=start.quaternion,
+        mass=thing.mass,
+        ipos=thing.center_of_mass,
+        iquat=thing.principal_axes,
+        inertia=thing.inertia,
+        explicitinertial=True,
+        mocap=motion is ObjectMotion.POSED,
+    )
+    if motion is ObjectMotion.FREE:
+        body.add_freejoint(name=thing.name)
+    for geom in thing.geoms:
+        _add_geom(spec, body, geom)
+
+
+def _add_pairs(spec: mujoco.MjSpec, scenario: Scenario) -> None:
+    """Explicit pairs: without them friction is the larger of the two geoms'."""
+    for hand in scenario.hands:
+        _add_pair(spec, scenario, tip_geom(hand), hand.geom, hand.friction)
+    frictions: dict[tuple[str, str], Friction] = {}
+    placed = [(s.name, s.surface, s.geom, s.friction) for s in scenario.supports]
+    placed += [("rest", r.surface, r.geom, r.friction) for r in scenario.rests]
+    for name, surface, geom, friction in placed:
+        known = frictions.setdefault((surface, geom), friction)
+        if known != friction:
+            valid = f"{known}, as at other contacts of {geom} on {surface}"
+            raise InvalidInputError(f"{name}.friction", friction, valid)
+    for (surface, geom), friction in frictions.items():
+        _add_pair(spec, scenario, surface, geom, friction)
+
+
+def _add_pair(
+    spec: mujoco.MjSpec, scenario: Scenario, first: str, second: str, friction: Friction
+) -> None:
+    """An elliptic cone with condim 4 is exactly SFCE, (2) of the paper; with condim 3 PCWF, (1)."""
+    physics = scenario.physics
+    torsion = 0.0 if friction.e_n is None else friction.mu * friction.e_n
+    spec.add_pair(
+        name=f"{first}-{second}",
+        geomname1=first,
+        geomname2=second,
+        condim=3 if friction.e_n is None else 4,
+        friction=[friction.mu, friction.mu, torsion, 0.0, 0.0],
+        solref=physics.solref,
+        solreffriction=physics.solref_friction,
+        solimp=[*physics.solimp, 0.5, 2.0],
+    )
+
+
+def _add_view(spec: mujoco.MjSpec, scenario: Scenario) -> None:
+    """Lights and a camera on the scene for MuJoCo's own viewer."""
+    spec.worldbody.add_light(pos=[0.0, -1.5, 2.5], dir=[0.2, 0.6, -1.0])
+    spec.worldbody.add_light(pos=[1.5, 1.5, 2.5], dir=[-0.4, -0.5, -1.0])
+    spec.stat.center = scenario.path.point_W
+    spec.stat.extent = 1.0
+    spec.visual.headlight.ambient = [0.4, 0.4, 0.4]
+    spec.visual.global_.offwidth, spec.visual.global_.offheight = 1280, 960

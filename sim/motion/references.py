@@ -1,0 +1,62 @@
+"""What the controller follows, tabulated for a whole run: it depends on time alone."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from fulcrum.sim.motion.joint_path import JointPath
+from fulcrum.sim.signals.target import Target
+from fulcrum.synthesis.arrays import Array
+
+
+class References:
+    """A joint path's references at the ticks of a clock, found in one go."""
+
+    def __init__(self, path: JointPath, timestep: float) -> None:
+        """Takes a path, and the time between ticks [s]."""
+        self._path, self._timestep = path, timestep
+        ticks = round(path.schedule.total_s / timestep)
+        # A plant's clock adds up its steps, with their rounding.
+        times = np.concatenate([[0.0], np.cumsum(np.full(ticks, timestep))])
+        asked = path.schedule.at(times)
+        self._q = np.empty((len(times), len(path.start)))
+        self._qd, self._qdd = np.empty_like(self._q), np.empty_like(self._q)
+        for phase in range(len(path.schedule.phases)):
+            rows = asked.phase == phase
+            progress = asked.progress[rows], asked.rate[rows, None], asked.acceleration[rows, None]
+            self._q[rows], self._qd[rows], self._qdd[rows] = _motion(path, phase, *progress)
+        # Python's own numbers, which are read off several times faster one by one.
+        self._times = times.tolist()
+        rate, acceleration = asked.turn * asked.rate, asked.turn * asked.acceleration
+        self._phase, self._tilt, self._grip, self._rate, self._acceleration = (
+            column.tolist() for column in (asked.phase, asked.tilt, asked.grip, rate, acceleration)
+        )
+
+    def at(self, t: float) -> Target:
+        """References at a time [s]; read off at ticks, computed between them and after the end."""
+        row = round(t / self._timestep)
+        if row < len(self._times) and self._times[row] == t:
+            return Target(
+                self._phase[row],
+                self._tilt[row],
+                self._grip[row],
+                self._q[row],
+                self._qd[row],
+                self._rate[row],
+                self._acceleration[row],
+                self._qdd[row],
+            )
+        asked, path = self._path.schedule.at(t), self._path
+        phase = int(asked.phase)
+        q, qd, qdd = _motion(path, phase, asked.progress, asked.rate, asked.acceleration)
+        rate, acceleration = float(asked.turn * asked.rate), float(asked.turn * asked.acceleration)
+        return Target(phase, float(asked.tilt), float(asked.grip), q, qd, rate, acceleration, qdd)
+
+
+def _motion(
+    path: JointPath, phase: int, progress: Array, rate: Array, acceleration: Array
+) -> tuple[Array, Array, Array]:
+    """Angles, speeds and accelerations of the joints at a phase's progress and its derivatives."""
+    q, slope = path.at(phase, progress)
+    curvature = path.curvature(phase, progress)
+    return q, slope * rate, slope * acceleration + curvature * rate**2

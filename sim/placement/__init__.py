@@ -1,0 +1,1 @@
+"""Where to stand and where to hold: a search over bases, contacts and postures."""

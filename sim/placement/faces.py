@@ -1,0 +1,157 @@
+"""Where on an object's faces a hand may hold it, by two coordinates of a face."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.optimize import minimize
+from scipy.spatial.transform import Rotation
+
+from fulcrum.sim.geometry.pose import Vector, triple
+from fulcrum.sim.geometry.shape import Shape
+from fulcrum.sim.model.contacts import across
+from fulcrum.sim.scenario.contacts import Hand
+from fulcrum.sim.scenario.scenario import Scenario
+from fulcrum.synthesis import InvalidInputError
+from fulcrum.synthesis.arrays import Array
+
+Range = tuple[float, float]
+
+# How far off its face a contact may be, to count as on it [m].
+_ON_FACE = 1e-3
+# Steps in which a face is measured, and in which a contact's coordinates are sought.
+_MEASURED, _SOUGHT = 64, 32
+# Digits of coordinates: 0.1 mm on a face of a metre.
+_DIGITS = 4
+
+
+@dataclass(frozen=True, eq=False)
+class Faces:
+    """The faces that a hand may touch.
+
+    Attributes:
+        hand: The hand where it is now.
+        shape: The object's.
+        names: Of the faces, that of the present one first.
+        now: Coordinates of the hand's place on that face [-].
+        ranges: Of the coordinates u and v on each face [-], without its border.
+    """
+
+    hand: Hand
+    shape: Shape
+    names: tuple[str, ...]
+    now: tuple[float, float]
+    ranges: tuple[tuple[Range, Range], ...]
+
+    def held(self, face: float, u: float, v: float) -> Hand:
+        """The hand elsewhere; its axes are turned along with the normal.
+
+        Args:
+            face: Which face, as a share of their number [-]: from 0 on the first, to 1 the last.
+            u, v: Coordinates, as shares of their ranges [-].
+        """
+        index = min(int(face * len(self.names)), len(self.names) - 1)
+        shares = zip(self.ranges[index], (u, v), strict=True)
+        at = [round(low + share * (high - low), _DIGITS) for (low, high), share in shares]
+        place = self.shape.place(self.names[index], *at)
+        return moved(self.hand, place.point, place.normal, self.shape)
+
+    @property
+    def shares(self) -> tuple[float, float]:
+        """The present coordinates as shares of their ranges [-]."""
+        u, v = (
+            (now - low) / (high - low) if high > low else 0.5
+            for now, (low, high) in zip(self.now, self.ranges[0], strict=True)
+        )
+        return u, v
+
+
+def faces_of(scenario: Scenario, hand: Hand, allowed: tuple[str, ...], border: float) -> Faces:
+    """The faces that a hand may touch.
+
+    Args:
+        scenario: The scene.
+        hand: One of its hands.
+        allowed: Names of faces; that on which the hand is may be left out.
+        border: What contacts keep clear of at the ends of a face [m].
+
+    Raises:
+        InvalidInputError: The object is of no shape, has no such face, or the hand is not on it.
+    """
+    shape = shape_of(scenario)
+    for name in allowed:
+        if name not in shape.faces:
+            valid = f"one of {', '.join(shape.faces)}"
+            raise InvalidInputError(f"{hand.name}: face", name, valid)
+    place = shape.closest(hand.p_OC_O)
+    off = float(np.linalg.norm(np.subtract(place.point, hand.p_OC_O)))
+    if off > _ON_FACE:
+        near = ", ".join(f"{x:.4g}" for x in place.point)
+        valid = f"a point of the surface, such as the nearest one, ({near}), {1e3 * off:.0f} mm off"
+        raise InvalidInputError(f"{hand.name}.p_OC_O", hand.p_OC_O, valid)
+    names = tuple(dict.fromkeys((place.face, *allowed)))
+    now = coordinates(shape, place.face, hand.p_OC_O)
+    ranges = [_ranges(shape, name, border) for name in names]
+    ranges[0] = _containing(ranges[0][0], now[0]), _containing(ranges[0][1], now[1])
+    return Faces(hand, shape, names, now, tuple(ranges))
+
+
+def shape_of(scenario: Scenario) -> Shape:
+    """The object's shape.
+
+    Raises:
+        InvalidInputError: It has none.
+    """
+    thing = scenario.object
+    if thing.shape is None:
+        valid = "a shape on whose faces contacts may move, or contacts that stay"
+        raise InvalidInputError(f"{thing.name}.shape", "none", valid)
+    return thing.shape
+
+
+def moved(hand: Hand, point: Vector, normal: Vector, shape: Shape) -> Hand:
+    """A hand at another place; its tangent is carried along as the normal turns."""
+    if normal == hand.normal_O:
+        return replace(hand, p_OC_O=point, geom=shape.touched(hand.geom, point))
+    old, new = np.asarray(hand.normal_O, float), np.asarray(normal, float)
+    axis, cosine = np.cross(old, new), float(old @ new)
+    sine = float(np.linalg.norm(axis))
+    # The normal of the opposite face is reached by a turn about the tangent, which stays.
+    turn = np.zeros(3) if sine < 1e-9 else np.arctan2(sine, cosine) / sine * axis
+    tangent = across(Rotation.from_rotvec(turn).apply(hand.tangent_O), new)
+    geom = shape.touched(hand.geom, point)
+    return replace(hand, p_OC_O=point, normal_O=normal, tangent_O=triple(tangent), geom=geom)
+
+
+def coordinates(shape: Shape, face: str, p_O: Vector) -> tuple[float, float]:
+    """Coordinates of a point of a face: there is no formula for all shapes."""
+
+    def distance(at: Array) -> float:
+        u, v = np.clip(at, 0.0, 1.0).tolist()
+        return float(np.linalg.norm(np.subtract(shape.place(face, u, v).point, p_O)))
+
+    grid = [(i / _SOUGHT, j / _SOUGHT) for i in range(_SOUGHT + 1) for j in range(_SOUGHT + 1)]
+    first = min(grid, key=lambda at: distance(np.array(at)))
+    options = {"xatol": 1e-9, "fatol": 1e-12, "maxiter": 2000, "maxfev": 2000}
+    found = minimize(distance, first, method="Nelder-Mead", options=options)
+    u, v = np.clip(found.x, 0.0, 1.0).tolist()
+    return u, v
+
+
+def _ranges(shape: Shape, face: str, border: float) -> tuple[Range, Range]:
+    """Ranges of both coordinates, without a border [m] where the face ends."""
+    ranges = []
+    for k in range(2):
+        at = np.full((_MEASURED + 1, 2), 0.5)
+        at[:, k] = np.linspace(0.0, 1.0, _MEASURED + 1)
+        points = np.array([shape.place(face, *uv).point for uv in at.tolist()])
+        length = float(np.linalg.norm(np.diff(points, axis=0), axis=1).sum())
+        closed = np.linalg.norm(points[0] - points[-1]) < _ON_FACE
+        room = 0.0 if closed else min(border / length, 0.5)
+        ranges.append((room, 1.0 - room))
+    return ranges[0], ranges[1]
+
+
+def _containing(ends: Range, value: float) -> Range:
+    return min(ends[0], value), max(ends[1], value)

@@ -1,0 +1,85 @@
+"""The contact force synthesis problems along a scenario's path, without a simulation."""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from fulcrum.sim.model.grip import GripSchedule
+from fulcrum.sim.model.object_path import object_path
+from fulcrum.sim.model.robot import RobotModel
+from fulcrum.sim.model.statics import Statics, gravity
+from fulcrum.sim.motion.ik import plan_joints
+from fulcrum.sim.motion.joint_path import JointPath
+from fulcrum.sim.scenario.control import Control
+from fulcrum.sim.scenario.scenario import Scenario
+from fulcrum.synthesis import InvalidInputError, Problem
+from fulcrum.synthesis.arrays import Array
+from fulcrum.synthesis.problem import Gravity
+
+
+class PathProblems:
+    """Object on its path, arms in the posture that inverse kinematics plans for it.
+
+    Attributes:
+        scenario: The scene.
+        end_deg: Tilt at the end of the path [deg].
+        joint_path: How the arms follow it; None without joints.
+    """
+
+    def __init__(
+        self,
+        scenario: Scenario,
+        control: Control,
+        with_joints: bool = True,
+        joint_path: JointPath | None = None,
+        grip: GripSchedule | None = None,
+    ) -> None:
+        """Plans the joint path, if need be.
+
+        Args:
+            scenario: The scene.
+            control: What the synthesis is told: friction factor, preload, objective.
+            with_joints: Whether the arms are part of the problem: (15) and (16).
+            joint_path: The scenario's, where it is planned already.
+            grip: The least normal forces of the hands; the control's preload if left out.
+
+        Raises:
+            PathError: The arms cannot follow the path.
+        """
+        self.scenario = scenario
+        self._path = object_path(scenario.path)
+        self.end_deg = float(np.degrees(self._path.end))
+        self._robot = RobotModel(scenario) if with_joints else None
+        self.joint_path = joint_path or plan_joints(scenario) if with_joints else None
+        self._statics = Statics(scenario, control, self._robot, grip)
+
+    def tilts(self, step_deg: float) -> Array:
+        """Evenly spaced tilts from start to end, at most a step apart [deg]."""
+        return np.linspace(0.0, self.end_deg, int(np.ceil(self.end_deg / step_deg - 1e-9)) + 1)
+
+    def problem(self, tilt_deg: float) -> Problem:
+        """The problem at a tilt [deg].
+
+        Raises:
+            InvalidInputError: The tilt is not on the path.
+        """
+        tilt = self._tilt(tilt_deg)
+        if self._robot is not None and self.joint_path is not None:
+            self._robot.update(self.joint_path.holding(tilt))
+        R_WO, p_WO = self._path.pose(tilt)
+        quat_WO = Rotation.from_matrix(R_WO).as_quat(scalar_first=True)
+        return self._statics.problem(p_WO, quat_WO, tilt)
+
+    def gravity(self, tilt_deg: float) -> Gravity:
+        """The object's weight at a tilt [deg]."""
+        return gravity(self.scenario.object, self.orientation(tilt_deg))
+
+    def orientation(self, tilt_deg: float) -> Array:
+        """Orientation of the object at a tilt [deg], R_WO, (3, 3)."""
+        return self._path.pose(self._tilt(tilt_deg))[0]
+
+    def _tilt(self, tilt_deg: float) -> float:
+        if not 0.0 <= tilt_deg <= self.end_deg + 1e-9:
+            raise InvalidInputError("tilt", tilt_deg, f"from 0 to {self.end_deg:g} deg")
+        return min(float(np.radians(tilt_deg)), self._path.end)

@@ -1,0 +1,278 @@
+"""A planned tilt: the fastest, easiest or safest timing of a scenario's path, and the forces."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import NamedTuple
+
+import numpy as np
+from scipy.interpolate import BSpline, make_interp_spline
+
+from fulcrum.sim.planning.problem import CERTAIN, Margins, path_problem
+from fulcrum.sim.scenario.scenario import Scenario
+from fulcrum.synthesis import FulcrumError, InvalidInputError
+from fulcrum.synthesis.arrays import Array
+from fulcrum.synthesis.checks import positive
+from fulcrum.synthesis.path.loads import solve_many
+from fulcrum.synthesis.path.problem import PathObjective, PathProblem
+from fulcrum.synthesis.path.rows import Indices
+from fulcrum.synthesis.path.solution import InfeasiblePathError, PathSolution
+from fulcrum.synthesis.robust.uncertainty_set import UncertaintySet
+
+# What the solver's accuracy may add to a limit that a plan uses up, as a share of it [-].
+_EXCESS = 1e-6
+
+
+class PlanError(FulcrumError):
+    """No timing of the tilt keeps all limits; names those that weigh most, and at which tilt."""
+
+    def __init__(self, scenario: str, what: str, binding: list[tuple[str, float]]) -> None:
+        self.binding = binding
+        named = [
+            name if math.isnan(tilt) else f"{name} at {tilt:.1f} deg" for name, tilt in binding
+        ]
+        super().__init__(f"{scenario}: {what} breaks a limit; most binding: {', '.join(named)}.")
+
+
+class Moment(NamedTuple):
+    """A plan at one instant.
+
+    Attributes:
+        tilt, rate, acceleration: [rad, rad/s, rad/s^2].
+        q, qd, qdd: Joint angles, speeds and accelerations [rad or m, per s, per s^2], (l,).
+        w_OC_C: Wrenches on the object in contact axes [N, N·m], (m, 6).
+        tau: Joint torques [N·m or N], (l,).
+    """
+
+    tilt: float
+    rate: float
+    acceleration: float
+    q: Array
+    qd: Array
+    qdd: Array
+    w_OC_C: Array
+    tau: Array
+
+
+class Along(NamedTuple):
+    """A plan at many tilts.
+
+    Attributes:
+        rate: [rad/s], (k,).
+        w_OC_C: Wrenches on the object in contact axes [N, N·m], (k, m, 6).
+        tau: Joint torques [N·m or N], (k, l).
+    """
+
+    rate: Array
+    w_OC_C: Array
+    tau: Array
+
+
+@dataclass(frozen=True, eq=False)
+class Plan:
+    """Timing, joint motion and forces of a tilt, from rest to rest.
+
+    Attributes:
+        scenario: What is tilted.
+        margins: What it keeps clear of.
+        joints: Names of the joints.
+        solution: Timing and forces; its path coordinate is the share of the tilt.
+        q: Joint angles over that share.
+        share: How much it serves of the uncertainty that was asked for [-]; 1 is all of it.
+    """
+
+    scenario: Scenario
+    margins: Margins
+    joints: tuple[str, ...]
+    solution: PathSolution
+    q: BSpline
+    share: float = 1.0
+
+    @cached_property
+    def tilt(self) -> Array:
+        """Tilt at the grid points [rad], (K,)."""
+        return self.solution.problem.s * math.radians(self.scenario.path.angle_deg)
+
+    @property
+    def times(self) -> Array:
+        """When the grid points are reached [s], (K,)."""
+        return self.solution.times
+
+    @property
+    def duration(self) -> float:
+        """Of the tilt [s]."""
+        return self.solution.duration
+
+    @property
+    def peak_rate(self) -> float:
+        """The fastest that it turns [rad/s]."""
+        return math.sqrt(self.solution.b.max()) * math.radians(self.scenario.path.angle_deg)
+
+    def at(self, t: float) -> Moment:
+        """The plan at a time [s]; before its start and after its end at rest there.
+
+        The timing is exact; forces and torques are linear in the tilt between grid points, where
+        they jump. With a force rate they and the acceleration are linear in time between the
+        middles of intervals, and continuous.
+        """
+        found = self.solution
+        s = found.problem.s
+        k = int(np.clip(np.searchsorted(self.times, t, side="right") - 1, 0, len(s) - 2))
+        elapsed = min(max(t - self.times[k], 0.0), self.times[k + 1] - self.times[k])
+        start = math.sqrt(found.b[k])
+        a, moving = float(found.a[k]), 0.0 <= t <= self.duration
+        share = s[k] + elapsed * (start + a * elapsed / 2.0)
+        rate = (start + a * elapsed) if moving else 0.0
+        a = a if moving else 0.0
+        if self._smooth is not None and moving:
+            a = float(self._smooth[2](np.clip(t, self._smooth[2].t[0], self._smooth[2].t[-1])))
+        part = float(np.clip((share - s[k]) / (s[k + 1] - s[k]), 0.0, 1.0))
+        w, tau = self._between(np.array([k]), np.array([part]), np.array([t]))
+        end = math.radians(self.scenario.path.angle_deg)
+        slope, curvature = self.q(share, 1), self.q(share, 2)
+        return Moment(
+            tilt=share * end,
+            rate=rate * end,
+            acceleration=a * end,
+            q=self.q(share),
+            qd=slope * rate,
+            qdd=slope * a + curvature * rate**2,
+            w_OC_C=w[0],
+            tau=tau[0],
+        )
+
+    def _between(self, k: Indices, part: Array, t: Array) -> tuple[Array, Array]:
+        """Wrenches, (n, m, 6), and torques, (n, l), that far in intervals k, at times t [s]."""
+        w, tau = self.solution.w_OC_C[0], self.solution.tau[0]
+        if self._smooth is not None:
+            t = np.clip(t, self._smooth[0].t[0], self._smooth[0].t[-1])
+            return self._smooth[0](t), self._smooth[1](t)
+        first, second = 2 * k, 2 * k + 1
+        w = w[first] + part[:, None, None] * (w[second] - w[first])
+        return w, tau[first] + part[:, None] * (tau[second] - tau[first])
+
+    @cached_property
+    def _smooth(self) -> tuple[BSpline, ...] | None:
+        """Wrenches, torques and acceleration over time where the force rate is limited.
+
+        The means of intervals, in their middles, and what holds still at rest: the limit is theirs.
+        """
+        found, times = self.solution, self.times
+        if found.problem.force_rate is None:
+            return None
+        ends = 2 * len(times) - 2
+        middles = (times[:-1] + times[1:]) / 2.0
+        knots = np.append(middles, times[list(found.problem.rests)])
+        order = np.argsort(knots)
+        means = (
+            np.concatenate([(each[:ends:2] + each[1:ends:2]) / 2.0, each[ends:]])[order]
+            for each in (found.w_OC_C[0], found.tau[0], found.motion[0])
+        )
+        return tuple(make_interp_spline(knots[order], mean, k=1) for mean in means)
+
+    def along(self, tilts: Array) -> Along:
+        """The plan over the tilt instead of time, with forces and torques as in :meth:`at`.
+
+        Args:
+            tilts: [rad], (k,); beyond its ends the plan's at those.
+        """
+        found, s = self.solution, self.solution.problem.s
+        share = np.clip(tilts / math.radians(self.scenario.path.angle_deg), s[0], s[-1])
+        k = np.clip(np.searchsorted(s, share, side="right") - 1, 0, len(s) - 2)
+        part = (share - s[k]) / (s[k + 1] - s[k])
+        squared = found.b[k] + part * (found.b[k + 1] - found.b[k])
+        rate = np.sqrt(np.maximum(squared, 0.0))
+        mean = np.maximum(rate + np.sqrt(found.b[k]), np.finfo(float).tiny) / 2.0
+        w, tau = self._between(k, part, self.times[k] + (share - s[k]) / mean)
+        return Along(rate * math.radians(self.scenario.path.angle_deg), w, tau)
+
+    def stretched(self, factor: float) -> Plan:
+        """The same motion in ``factor`` times the duration, with forces of its own.
+
+        They are best for the plan's objective; of a plan in least time they have the largest
+        friction margin.
+
+        Args:
+            factor: > 0; below 1 the motion is faster.
+
+        Raises:
+            PlanError: There are none, as where statics has none and only speed helps; says where.
+        """
+        positive("stretch", factor)
+        what = f"a tilt in {self.duration * factor:.3g} s"
+        self._check_speeds(factor, what)
+        timing, objective = self.solution.b / factor**2, self.solution.problem.objective
+        if objective is PathObjective.LEAST_TIME:
+            objective = PathObjective.FRICTION_MARGIN
+        problem = replace(
+            self.solution.problem, timing=timing, duration=math.inf, objective=objective
+        )
+        return replace(self, solution=_solve(self.scenario, problem, what))
+
+    def _check_speeds(self, factor: float, what: str) -> None:
+        """Refuses what breaks limits of speed or acceleration, which no forces could change."""
+        places = self.tilt[self.solution.problem.stations[:, 0]]
+        broken: dict[str, tuple[float, float]] = {}
+        for kind, power in (("speed", 1), ("acceleration", 2)):
+            for name, used in self.solution.shares.items():
+                k = int(used.argmax())
+                excess = used[k] / factor**power - 1.0
+                if name.startswith(f"{kind} of ") and excess > _EXCESS:
+                    broken[name] = float(excess), float(np.degrees(places[k]))
+        if broken:
+            worst = max(broken, key=lambda name: broken[name][0])
+            raise PlanError(self.scenario.name, what, [(worst, broken[worst][1])])
+
+    def _repr_markdown_(self) -> str:
+        from fulcrum.sim.run.notebook import plan_markdown
+
+        return plan_markdown(self)
+
+
+def plan(
+    scenario: Scenario,
+    margins: Margins,
+    objective: PathObjective = PathObjective.LEAST_TIME,
+    duration: float = math.inf,
+    points: int = 100,
+    uncertainty: UncertaintySet = CERTAIN,
+    start: float = 0.0,
+    start_rate: float = 0.0,
+    curve: BSpline | None = None,
+) -> Plan:
+    """Plans the tilt of a scenario.
+
+    Args:
+        scenario: The scene; the timing and the forces of its own phases do not count.
+        margins: What to keep clear of.
+        objective: What is minimised.
+        duration: The longest that the tilt may take [s].
+        points: Grid points, at least 3.
+        uncertainty: What the plan is to serve with one timing and one grip.
+        start: Share of the tilt at which it begins, below 1 [-].
+        start_rate: At which rate of that share [1/s].
+        curve: Joint angles over the share of the tilt, where they are known already.
+
+    Raises:
+        InvalidInputError: An argument is senseless.
+        PathError: The arms cannot follow the path.
+        PlanError: No timing keeps all limits.
+    """
+    if points < 3:
+        raise InvalidInputError("points", points, "an integer >= 3")
+    if not 0.0 <= start < 1.0:
+        raise InvalidInputError("start", start, "a share in [0, 1)")
+    problem, curve, joints = path_problem(scenario, margins, points, uncertainty, start, curve)
+    problem = replace(problem, objective=objective, duration=duration, start_rate=start_rate)
+    what = "every tilt" if math.isinf(duration) else f"every tilt in at most {duration:g} s"
+    return Plan(scenario, margins, joints, _solve(scenario, problem, what), curve)
+
+
+def _solve(scenario: Scenario, problem: PathProblem, what: str) -> PathSolution:
+    try:
+        return solve_many(problem)
+    except InfeasiblePathError as error:
+        binding = [(name, s * scenario.path.angle_deg) for name, s in error.binding]
+        raise PlanError(scenario.name, what, binding) from error

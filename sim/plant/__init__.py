@@ -1,0 +1,1 @@
+"""What is controlled: MuJoCo's truth about robot, object and contacts."""

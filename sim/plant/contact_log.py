@@ -1,0 +1,180 @@
+"""The plant's contacts: kept step by step as MuJoCo has them, told apart for many steps at once."""
+
+from __future__ import annotations
+
+import mujoco
+import numpy as np
+from numpy.typing import NDArray
+
+from fulcrum.sim.model.scene import tip_geom, unwanted_pairs
+from fulcrum.sim.scenario.scenario import Scenario
+from fulcrum.synthesis.arrays import Array
+
+# A plant contact belongs to the environment contact point within this distance [m].
+_SAME_POINT = 0.01
+# Contacts, and components of constraint forces, that there is room for at first.
+_ROOM = 1024
+_COMPONENTS = np.arange(6)  # of a wrench
+
+
+class ContactLog:
+    """MuJoCo's contacts of consecutive steps, one row per contact.
+
+    Attributes:
+        count: How many there are; rows from there on do not count.
+        geoms: The two geoms, (k, 2).
+        point: In the world [m], (k, 3).
+        frame: Contact axes row by row, first the normal from the first geom to the second, (k, 9).
+    """
+
+    def __init__(self) -> None:
+        self.geoms, self.point = np.zeros((_ROOM, 2), np.intp), np.zeros((_ROOM, 3))
+        self.frame = np.zeros((_ROOM, 9))
+        # Constraint forces step by step: where among those of its step a contact's own are (-1: it
+        # has none), and how many.
+        self._forces = np.zeros(_ROOM)
+        self._address, self._dim = np.zeros((2, _ROOM), np.intp)
+        # Of each step its time, how many contacts it has, and where its forces begin.
+        self._t: list[float] = []
+        self._counts: list[int] = []
+        self._begin: list[int] = []
+        self.clear()
+
+    def clear(self) -> None:
+        """Forgets all steps."""
+        self.count = self._forces_count = 0
+        for numbers in (self._t, self._counts, self._begin):
+            numbers.clear()
+
+    @property
+    def step(self) -> NDArray[np.intp]:
+        """Index of each contact's step, (count,)."""
+        return np.repeat(np.arange(len(self._counts)), self._counts)
+
+    @property
+    def t(self) -> Array:
+        """Time after each contact's step [s], (count,)."""
+        return np.repeat(self._t, self._counts)
+
+    def append(self, data: mujoco.MjData) -> None:
+        """Keeps the contacts of the step that was just made."""
+        contacts, forces = data.contact, data.efc_force
+        count, begin = data.ncon, self._forces_count
+        first, last, end = self.count, self.count + count, begin + len(forces)
+        while last > len(self.geoms) or end > len(self._forces):
+            self._grow()
+        rows = slice(first, last)
+        self._t.append(data.time)
+        self._counts.append(count)
+        self._begin.append(begin)
+        self.geoms[rows], self.point[rows] = contacts.geom, contacts.pos
+        self.frame[rows], self._dim[rows] = contacts.frame, contacts.dim
+        self._address[rows], self._forces[begin:end] = contacts.efc_address, forces
+        self.count, self._forces_count = last, end
+
+    def wrenches(self) -> Array:
+        """On the second geom in the contact's axes, force first [N, N·m], (count, 6).
+
+        As of mj_contactForce for elliptic cones, whose constraint forces are contact forces.
+        """
+        address, dim = (column[: self.count, None] for column in (self._address, self._dim))
+        begin = np.repeat(self._begin, self._counts)[:, None]
+        forces = self._forces.take(begin + address + _COMPONENTS, mode="clip")
+        return np.where((address >= 0) & (dim > _COMPONENTS), forces, 0.0)
+
+    def _grow(self) -> None:
+        for name, array in vars(self).items():
+            if isinstance(array, np.ndarray):
+                setattr(self, name, np.concatenate([array, np.zeros_like(array)]))
+
+
+class ContactReader:
+    """Finds the scenario's contacts among MuJoCo's, by their geoms and places.
+
+    Attributes:
+        collisions: Pairs of geoms that touched against the scenario's will, and when first [s].
+    """
+
+    def __init__(self, scenario: Scenario, model: mujoco.MjModel) -> None:
+        self.collisions: dict[tuple[str, str], float] = {}
+        self._geoms = [model.geom(g).name for g in range(model.ngeom)]
+        self._is_object = np.isin(self._geoms, [g.name for g in scenario.object.geoms])
+        self._unwanted = np.zeros((model.ngeom, model.ngeom), bool)
+        for first, second in unwanted_pairs(scenario, model):
+            self._set(self._unwanted, first, second, True)
+        # Which hand's contact a pair of geoms is; -1 for none.
+        self._hand = np.full((model.ngeom, model.ngeom), -1)
+        for i, hand in enumerate(scenario.hands):
+            self._set(self._hand, tip_geom(hand), hand.geom, i)
+        self._hands = len(scenario.hands)
+        supports: dict[tuple[str, str], list[int]] = {}
+        for i, support in enumerate(scenario.supports):
+            supports.setdefault((support.surface, support.geom), []).append(i)
+        # Supports by pair of geoms, and which of these pairs a pair is; -1 for none.
+        self._supports = list(map(np.array, supports.values()))
+        self._pair = np.full((model.ngeom, model.ngeom), -1)
+        for i, pair in enumerate(supports):
+            self._set(self._pair, *pair, i)
+        self._points_O = np.array([support.p_OP_O for support in scenario.supports])
+
+    def _set(self, table: NDArray, first: str, second: str, value: int) -> None:
+        a, b = self._geoms.index(first), self._geoms.index(second)
+        table[a, b] = table[b, a] = value
+
+    def read(
+        self, log: ContactLog, p_WO: Array, R_WO: Array, positions: Array, wrenches: Array
+    ) -> NDArray[np.intp]:
+        """Adds up the plant's contacts of s steps at each of the scenario's m contacts.
+
+        Args:
+            log: The plant's contacts; steps count from 0.
+            p_WO: Positions of the object [m], (s, 3).
+            R_WO: Orientations of the object, (s, 3, 3).
+            positions: Written with the contact points in the world [m], (s, m, 3); where there is
+                no contact it is left as it is.
+            wrenches: Written with forces on the object in world axes [N] and torsional moments
+                about the normal into the object [N·m], (s, m, 4); zero where there is no contact.
+
+        Returns:
+            Number of contacts that the scenario does not want, (s,); see ``collisions``.
+        """
+        rows = slice(0, log.count)
+        step, geoms, point = log.step, log.geoms[rows], log.point[rows]
+        contact = self._contact(step, geoms, point, p_WO, R_WO)
+        ours = contact >= 0
+        where = step[ours], contact[ours]
+        axes, wrench = log.frame[rows][ours].reshape(-1, 3, 3), log.wrenches()[ours]
+        # The wrench is the one on the second geom.
+        sign = np.where(self._is_object[geoms[ours, 1]], 1.0, -1.0)
+        force = sign[:, None] * np.einsum("ki,kij->kj", wrench[:, :3], axes)
+        # Sums over the contacts at the same place; np.add.at takes ten times as long.
+        place = np.ravel_multi_index(where, wrenches.shape[:2])
+        for i, component in enumerate((*force.T, wrench[:, 3])):
+            sums = np.bincount(place, component, minlength=wrenches[..., i].size)
+            wrenches[..., i] = sums.reshape(wrenches.shape[:2])
+        positions[where] = point[ours]
+        return self._count_collisions(step, geoms, log.t, len(p_WO))
+
+    def _contact(
+        self, step: NDArray, geoms: NDArray, point: Array, p_WO: Array, R_WO: Array
+    ) -> NDArray[np.intp]:
+        """Which of the scenario's contacts each of the plant's is; -1 for none."""
+        contact = self._hand[geoms[:, 0], geoms[:, 1]]
+        pair = self._pair[geoms[:, 0], geoms[:, 1]]
+        for i, supports in enumerate(self._supports):
+            here = np.flatnonzero(pair == i)
+            p_OC_W = point[here] - p_WO[step[here]]
+            p_OC_O = np.einsum("ki,kij->kj", p_OC_W, R_WO[step[here]])
+            distances = np.linalg.norm(self._points_O[supports] - p_OC_O[:, None], axis=2)
+            nearest = np.argmin(distances, axis=1)
+            near = distances.min(axis=1) < _SAME_POINT
+            contact[here[near]] = self._hands + supports[nearest[near]]
+        return contact
+
+    def _count_collisions(
+        self, step: NDArray, geoms: NDArray, t: Array, steps: int
+    ) -> NDArray[np.intp]:
+        unwanted = self._unwanted[geoms[:, 0], geoms[:, 1]]
+        for (first, second), when in zip(geoms[unwanted].tolist(), t[unwanted], strict=True):
+            self.collisions.setdefault((self._geoms[first], self._geoms[second]), float(when))
+        return np.bincount(step[unwanted], minlength=steps)

@@ -1,0 +1,1 @@
+"""One run from request to report: preparation, the loop, files, and a dm_env environment."""

@@ -1,0 +1,117 @@
+"""A scenario as a ``dm_env`` environment: joint torques in, states and contact forces out."""
+
+from __future__ import annotations
+
+from collections import OrderedDict
+from typing import Any
+
+import numpy as np
+from dm_control.rl import control
+from dm_env import specs
+
+from fulcrum.sim.model.object_path import object_path
+from fulcrum.sim.model.robot import RobotModel
+from fulcrum.sim.motion.ik import plan_joints
+from fulcrum.sim.motion.schedule import Schedule
+from fulcrum.sim.plant.mujoco import Plant
+from fulcrum.sim.scenario.scenario import Scenario
+from fulcrum.synthesis import InvalidInputError
+from fulcrum.synthesis.arrays import Array
+from fulcrum.synthesis.checks import positive
+
+# How near to a whole number a number of steps must be.
+_WHOLE = 1e-6
+
+
+class TiltTask(control.Task):
+    """Tilt the object along the scenario's path.
+
+    The action is the joint torques [N·m or N], (l,), bounded by their limits. Observations:
+
+    - ``joint_positions``, ``joint_velocities``: (l,) [rad, rad/s].
+    - ``object_pose``: position [m] and quaternion wxyz, (7,); ``object_twist``: (6,), linear first.
+    - ``contact_forces``: force on the object in world axes [N] and torsional moment [N·m], (m, 4).
+
+    Contact forces and the object's twist are those during the last physics step, joints and pose
+    those after it. The reward is the share of the path's tilt that is reached, from 0 to 1.
+    """
+
+    def __init__(self, scenario: Scenario, plant: Plant, seed: int) -> None:
+        self._plant = plant
+        self._path = object_path(scenario.path)
+        self._robot = RobotModel(scenario)
+        self._start = plan_joints(scenario).start
+        self._deviation = self._robot.start_deviation
+        self._random = np.random.default_rng(seed)
+        self._p_WC = np.zeros((len(scenario.contact_names), 3))
+        self._f_W = np.zeros((len(scenario.contact_names), 4))
+
+    def initialize_episode(self, physics: Any) -> None:
+        """Puts robot and object at their start, the joints with small random deviations."""
+        deviation = self._deviation * self._random.normal(size=len(self._start))
+        self._plant.place(self._start + deviation)
+        self._f_W[:] = 0.0
+
+    def before_step(self, action: Array, physics: Any) -> None:
+        """Applies the torques."""
+        self._plant.apply(np.asarray(action))
+
+    def after_step(self, physics: Any) -> None:
+        """Reads the contact forces of the step."""
+        self._plant.contacts(self._p_WC, self._f_W)
+
+    def action_spec(self, physics: Any) -> specs.BoundedArray:
+        """Joint torques within their limits."""
+        robot = self._robot
+        shape = (len(robot.joints),)
+        names = "\t".join(robot.joints)
+        return specs.BoundedArray(shape, np.float64, robot.tau_min, robot.tau_max, names)
+
+    def get_observation(self, physics: Any) -> OrderedDict[str, Array]:
+        """The observations by name."""
+        measurement = self._plant.measure()
+        twist = np.zeros(6)
+        self._plant.object_twist(twist)
+        return OrderedDict(
+            joint_positions=measurement.q,
+            joint_velocities=measurement.qd,
+            object_pose=np.concatenate([measurement.p_WO, measurement.quat_WO]),
+            object_twist=twist,
+            contact_forces=self._f_W.copy(),
+        )
+
+    def get_reward(self, physics: Any) -> float:
+        """Share of the path's tilt that is reached."""
+        tilt = float(self._path.tilt(self._plant.measure().quat_WO))
+        return float(np.clip(tilt / self._path.end, 0.0, 1.0))
+
+
+def make_environment(
+    scenario: Scenario, seed: int = 0, control_timestep: float | None = None
+) -> control.Environment:
+    """The scenario as an environment.
+
+    Args:
+        scenario: The scene.
+        seed: Draws the deviations of the start posture.
+        control_timestep: Time between actions [s]; that of the synthesis if left out.
+
+    Raises:
+        InvalidInputError: The time between actions is no multiple of the physics step.
+        PathError: The arms cannot follow the path.
+    """
+    if control_timestep is None:
+        control_timestep = scenario.control.solve_every * scenario.physics.timestep
+    positive("control_timestep", control_timestep)
+    steps = control_timestep / scenario.physics.timestep
+    if abs(steps - round(steps)) > _WHOLE or round(steps) < 1:
+        valid = f"a multiple of the physics' {scenario.physics.timestep:g} s"
+        raise InvalidInputError("control_timestep", control_timestep, valid)
+    plant = Plant(scenario)
+    return control.Environment(
+        plant.physics,
+        TiltTask(scenario, plant, seed),
+        time_limit=Schedule(scenario).total_s,
+        control_timestep=control_timestep,
+        legacy_step=False,  # else new contacts would be read with old forces
+    )

@@ -1,0 +1,31 @@
+"""Output files as every part of fulcrum writes them."""
+
+from __future__ import annotations
+
+import json
+import math
+from pathlib import Path
+from typing import Any
+
+from fulcrum.synthesis import InvalidInputError
+
+
+def check_new_folder(field: str, out: Path) -> None:
+    """Refuses a folder that is not empty, or that cannot be made."""
+    nearest = next(path for path in (out, *out.absolute().parents) if path.exists())
+    if not nearest.is_dir() or (out.exists() and any(out.iterdir())):
+        raise InvalidInputError(field, str(out), "a new or empty folder")
+
+
+def write_json(path: Path, content: Any) -> None:
+    """Writes a JSON file; infinite numbers, which JSON does not know, become null."""
+    path.write_text(json.dumps(finite(content), indent=2, allow_nan=False) + "\n")
+
+
+def finite(value: Any) -> Any:
+    """The value with infinite and undefined numbers, at any depth, replaced by None."""
+    if isinstance(value, dict):
+        return {key: finite(item) for key, item in value.items()}
+    if isinstance(value, (list, tuple)):
+        return [finite(item) for item in value]
+    return None if isinstance(value, float) and not math.isfinite(value) else value

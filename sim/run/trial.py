@@ -1,0 +1,82 @@
+"""Capacities tried in closed loop."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+from fulcrum.sim.evaluation.report import Verdict
+from fulcrum.sim.geometry.object import GRAVITY
+from fulcrum.sim.run.execute import Progress, Request, execute
+from fulcrum.sim.scenario.control import Control
+from fulcrum.sim.scenario.scenario import Scenario
+
+
+@dataclass(frozen=True)
+class Trial:
+    """A closed-loop run with a share of the capacity.
+
+    Attributes:
+        share: Of the capacity [-].
+        weight: [N].
+        verdict: Of the run.
+        failures: What went wrong, in order of time.
+        failed_syntheses: How many found no forces, of ``syntheses``.
+        syntheses: How many there were.
+        torque_utilisation: Largest [-], at ``joint``.
+        joint: Which one.
+        saturated_fraction: Share of the time in which a torque was cut [-].
+        tilt_error_deg: Largest [deg].
+        slip_mm: Largest of all contacts [mm].
+    """
+
+    share: float
+    weight: float
+    verdict: Verdict
+    failures: tuple[str, ...]
+    failed_syntheses: int
+    syntheses: int
+    torque_utilisation: float
+    joint: str
+    saturated_fraction: float
+    tilt_error_deg: float
+    slip_mm: float
+
+
+def confirm(
+    scenario: Scenario,
+    controller: str,
+    control: Control,
+    capacity: float,
+    share: float,
+    progress: Progress | None = None,
+) -> Trial:
+    """Runs the closed loop with a share of the capacity; the inertia grows with the mass.
+
+    Args:
+        scenario: The scene.
+        controller: Name of the controller.
+        control: Its settings.
+        capacity: [N].
+        share: Of it [-].
+        progress: Called with steps done and steps in total.
+
+    Raises:
+        PathError: The arms cannot follow the path.
+    """
+    thing, weight = scenario.object, share * capacity
+    heavy = thing.weighing(weight / (thing.mass * GRAVITY))
+    request = Request(replace(scenario, object=heavy), controller, control, anyway=True)
+    report = execute(request, progress).report
+    return Trial(
+        share=share,
+        weight=weight,
+        verdict=report.verdict,
+        failures=report.failures,
+        failed_syntheses=report.synthesis.failures,
+        syntheses=report.synthesis.solves,
+        torque_utilisation=report.torque.max_utilisation,
+        joint=report.torque.joint,
+        saturated_fraction=report.torque.saturated_fraction,
+        tilt_error_deg=report.tilt.max_error_deg,
+        slip_mm=max(c.slip_mm for c in report.contacts.values()),
+    )

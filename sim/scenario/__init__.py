@@ -1,0 +1,1 @@
+"""What a scenario says: object, contacts, robots, path, phases, control, physics, tolerances."""

@@ -1,0 +1,113 @@
+"""Where hands and supports touch the object, and with what friction."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from fulcrum.sim.geometry.pose import Pose, Vector
+from fulcrum.synthesis import InvalidInputError
+from fulcrum.synthesis.checks import axes, positive, vector
+
+if TYPE_CHECKING:
+    pass
+
+
+@dataclass(frozen=True)
+class Friction:
+    """Coulomb friction with the ellipticities of the paper's (1) and (2).
+
+    Attributes:
+        mu: Coefficient [-].
+        e_n: Torsional over tangential friction [m]; None for a contact that carries no torsion.
+    """
+
+    mu: float
+    e_n: float | None = None
+
+    def __post_init__(self) -> None:
+        positive("friction.mu", self.mu)
+        if self.e_n is not None:
+            positive("friction.e_n", self.e_n)
+
+
+@dataclass(frozen=True)
+class Hand:
+    """A robot's end effector and the place where it holds the object.
+
+    The contact axes are n = ``normal_O``, t = ``tangent_O`` and o = n x t; the hand's tip axes (x,
+    y, z) coincide with (t, o, n), so that the hand turns with the object.
+
+    Attributes:
+        name: Name of the contact and prefix of the hand's parts.
+        mount: Body of a robot that carries the hand, with the robot's prefix.
+        model: Name of one that ships (see ``assets.HANDS``), or path of an MJCF file with a body
+            ``pad`` that has a spherical geom ``tip`` and a site ``tip_center``.
+        geom: The object's geom that is touched.
+        p_OC_O: Contact point in the object frame [m].
+        normal_O: Inward normal in the object's axes.
+        tangent_O: First tangent in the object's axes, perpendicular to the normal.
+        friction: Between tip and object.
+        f_n_max: Largest allowed normal force [N].
+        mount_pose: Of the body ``pad`` on the mount.
+    """
+
+    name: str
+    mount: str
+    model: str
+    geom: str
+    p_OC_O: Vector
+    normal_O: Vector
+    tangent_O: Vector
+    friction: Friction
+    f_n_max: float = math.inf
+    mount_pose: Pose = Pose()
+
+    def __post_init__(self) -> None:
+        axes(self.name, ("normal_O", self.normal_O), ("tangent_O", self.tangent_O))
+        vector(f"{self.name}.p_OC_O", self.p_OC_O, 3)
+        if not self.f_n_max > 0.0:
+            raise InvalidInputError(f"{self.name}.f_n_max", self.f_n_max, "a number > 0")
+
+
+@dataclass(frozen=True)
+class Support:
+    """A point of the object that stays on the environment while the object pivots.
+
+    Attributes:
+        name: Name of the contact.
+        geom: The object's geom that touches.
+        surface: Name of the environment's geom that is touched.
+        p_OP_O: The point in the object frame [m].
+        normal_W: Surface normal in world axes, into the object.
+        tangent_W: First tangent in world axes, perpendicular to the normal.
+        friction: Between object and surface.
+    """
+
+    name: str
+    geom: str
+    surface: str
+    p_OP_O: Vector
+    normal_W: Vector
+    tangent_W: Vector
+    friction: Friction
+
+    def __post_init__(self) -> None:
+        axes(self.name, ("normal_W", self.normal_W), ("tangent_W", self.tangent_W))
+        vector(f"{self.name}.p_OP_O", self.p_OP_O, 3)
+
+
+@dataclass(frozen=True)
+class Rest:
+    """Where the object may lie on the environment without the synthesis counting on it.
+
+    Attributes:
+        geom: The object's geom that touches.
+        surface: Name of the environment's geom that is touched.
+        friction: Between object and surface.
+    """
+
+    geom: str
+    surface: str
+    friction: Friction

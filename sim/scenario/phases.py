@@ -1,0 +1,94 @@
+"""The phases of a manoeuvre: what each brings tilt, hands and grip to."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+
+from fulcrum.sim.scenario.timing import Timing
+from fulcrum.synthesis import InvalidInputError
+
+# A trace takes about 2 kB per step: a gigabyte in this time [s].
+_LONGEST_S = 600.0
+
+
+# No arm reaches farther, and the joint path takes a step every 5 mm [m].
+FARTHEST_M = 10.0
+
+
+@dataclass(frozen=True)
+class Phase:
+    """A stretch of the manoeuvre: what it brings tilt, hands and grip to.
+
+    Attributes:
+        name: What people call it.
+        duration_s: [s].
+        tilt: Share of the path's angle at the end [-], 0 to 1.
+        gap: Distance of the tips from their contacts, along the outward normals, at the end [m].
+        grip: Share of the synthesised forces that is applied at the end [-], 0 to 1.
+        timing: How it goes there, in that duration; None for minimum jerk.
+    """
+
+    name: str
+    duration_s: float
+    tilt: float
+    gap: float
+    grip: float
+    timing: Timing | None = None
+
+    def __post_init__(self) -> None:
+        where = f"phase {self.name}"
+        if not 0.0 < self.duration_s <= _LONGEST_S:
+            valid = f"a duration > 0 s and <= {_LONGEST_S:g} s"
+            raise InvalidInputError(f"{where}.duration_s", self.duration_s, valid)
+        for field in ("tilt", "grip"):
+            if not 0.0 <= getattr(self, field) <= 1.0:
+                raise InvalidInputError(f"{where}.{field}", getattr(self, field), "in [0, 1]")
+        if not 0.0 <= self.gap <= FARTHEST_M:
+            valid = f"a finite distance >= 0 m and <= {FARTHEST_M:g} m"
+            raise InvalidInputError(f"{where}.gap", self.gap, valid)
+        if self.gap > 0.0 and self.grip > 0.0:
+            raise InvalidInputError(f"{where}.grip", self.grip, "0 while there is a gap")
+        if self.timing is not None and not math.isclose(self.duration_s, self.timing.duration):
+            valid = f"its timing's {self.timing.duration:g} s"
+            raise InvalidInputError(f"{where}.duration_s", self.duration_s, valid)
+
+
+STANDOFF = 0.06  # [m] of the hands from the object before and after they hold it
+
+
+# Approach fast and touch slowly; what comes after the tilt depends on whether the object can stand.
+REACH = (
+    Phase("approach", 1.5, tilt=0.0, gap=0.005, grip=0.0),
+    Phase("touch", 0.8, tilt=0.0, gap=0.0, grip=0.0),
+    Phase("grip", 1.0, tilt=0.0, gap=0.0, grip=1.0),
+)
+
+
+TILT = (Phase("tilt", 8.0, tilt=1.0, gap=0.0, grip=1.0),)
+
+
+HOLD = (Phase("hold", 0.5, tilt=1.0, gap=0.0, grip=1.0),)
+
+
+LEAVE = (
+    Phase("set down", 0.5, tilt=1.0, gap=0.0, grip=1.0),
+    Phase("let go", 1.0, tilt=1.0, gap=0.0, grip=0.0),
+    Phase("withdraw", 1.5, tilt=1.0, gap=STANDOFF, grip=0.0),
+    Phase("stand", 1.0, tilt=1.0, gap=STANDOFF, grip=0.0),
+)
+
+
+def tilting(phases: tuple[Phase, ...]) -> tuple[int, ...]:
+    """Indices of the phases that tilt the object."""
+    before = (0.0, *(phase.tilt for phase in phases))
+    return tuple(i for i, phase in enumerate(phases) if phase.tilt != before[i])
+
+
+def stretched(phases: tuple[Phase, ...], duration_s: float) -> tuple[Phase, ...]:
+    """The phases with every one that tilts the object taking the given time [s]."""
+    turns = tilting(phases)
+    return tuple(
+        replace(phase, duration_s=duration_s, timing=None) if i in turns else phase
+        for i, phase in enumerate(phases)
+    )

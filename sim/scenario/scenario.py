@@ -1,0 +1,128 @@
+"""What a scenario is: frozen data about object, contacts, robot, path and how it is run."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+from fulcrum.sim.geometry.geom import Geom
+from fulcrum.sim.geometry.object import Object
+from fulcrum.sim.geometry.pose import Vector
+from fulcrum.sim.scenario.contacts import Hand, Rest, Support
+from fulcrum.sim.scenario.control import Control
+from fulcrum.sim.scenario.path import Pivot, Poses
+from fulcrum.sim.scenario.phases import FARTHEST_M, HOLD, REACH, STANDOFF, TILT, Phase
+from fulcrum.sim.scenario.physics import Physics, Tolerances
+from fulcrum.sim.scenario.robot import Robot
+from fulcrum.synthesis import InvalidInputError
+from fulcrum.synthesis.checks import not_negative
+
+if TYPE_CHECKING:
+    pass
+
+
+@dataclass(frozen=True)
+class View:
+    """Where recordings look from, relative to the path's point [m].
+
+    Attributes:
+        eye: Where the eye stands.
+        target: What it looks at.
+    """
+
+    eye: Vector = (1.0, -0.5, 0.62)
+    target: Vector = (0.05, 0.0, 0.12)
+
+
+@dataclass(frozen=True)
+class Scenario:
+    """Everything that a run needs to know; nothing else may distinguish one scene from another.
+
+    ``holdable`` says whether forces that hold the object are expected to exist all along the path;
+    a scenario that shows the contrary says False. ``rests`` is where the object may lie besides
+    its supports, ``standoff`` the distance of the hands from their contacts at the start [m].
+    """
+
+    name: str
+    summary: str
+    object: Object
+    environment: tuple[Geom, ...]
+    hands: tuple[Hand, ...]
+    supports: tuple[Support, ...]
+    robots: tuple[Robot, ...]
+    path: Pivot | Poses
+    rests: tuple[Rest, ...] = ()
+    phases: tuple[Phase, ...] = (*REACH, *TILT, *HOLD)
+    standoff: float = STANDOFF
+    holdable: bool = True
+    control: Control = Control()
+    physics: Physics = Physics()
+    tolerances: Tolerances = Tolerances()
+    view: View = View()
+
+    def __post_init__(self) -> None:
+        not_negative("standoff", self.standoff)
+        if self.standoff > FARTHEST_M:
+            raise InvalidInputError("standoff", self.standoff, f"at most {FARTHEST_M:g} m")
+        if not self.phases:
+            raise InvalidInputError("phases", self.phases, "at least one phase")
+        for name in self.contact_names:
+            if self.contact_names.count(name) > 1:
+                raise InvalidInputError("contact names", name, "a name that no other contact has")
+        if not self.robots:
+            raise InvalidInputError("robots", self.robots, "at least one robot")
+        prefixes = [robot.prefix for robot in self.robots]
+        for prefix in prefixes:
+            if prefixes.count(prefix) > 1:
+                valid = "a prefix that no other robot has"
+                raise InvalidInputError("robot.prefix", repr(prefix), valid)
+        geoms = [g.name for g in self.object.geoms]
+        touched = [(hand.name, hand.geom) for hand in self.hands]
+        touched += [(support.name, support.geom) for support in self.supports]
+        touched += [("rest", rest.geom) for rest in self.rests]
+        for name, geom in touched:
+            if geom not in geoms:
+                raise InvalidInputError(f"{name}.geom", geom, f"one of {', '.join(geoms)}")
+        surfaces = [g.name for g in self.environment]
+        for name in (*geoms, *surfaces):
+            if [*geoms, *surfaces].count(name) > 1:
+                raise InvalidInputError("geom names", name, "a name that no other geom has")
+        placed = [(support.name, support.surface) for support in self.supports]
+        placed += [("rest", rest.surface) for rest in self.rests]
+        for name, surface in placed:
+            if surface not in surfaces:
+                raise InvalidInputError(f"{name}.surface", surface, f"one of {', '.join(surfaces)}")
+
+    @property
+    def contact_names(self) -> tuple[str, ...]:
+        """Names of all contacts, hands first: the order of every per-contact array."""
+        return (*(hand.name for hand in self.hands), *(support.name for support in self.supports))
+
+    @property
+    def posture(self) -> dict[str, float]:
+        """Start angle [rad or m] of every driven joint of all robots, by its name in the scene."""
+        robots = self.robots
+        return {r.prefix + joint: angle for r in robots for joint, angle in r.posture.items()}
+
+    @property
+    def still(self) -> tuple[str, ...]:
+        """Joints that keep still where they can, by their names in the scene."""
+        return tuple(robot.prefix + joint for robot in self.robots for joint in robot.still)
+
+    @property
+    def start_deviation(self) -> dict[str, float]:
+        """Standard deviation of every driven joint's start [rad or m], by its name in the scene."""
+        return {r.prefix + joint: r.start_deviation for r in self.robots for joint in r.posture}
+
+    def _repr_markdown_(self) -> str:
+        from fulcrum.sim.run.notebook import scenario_markdown
+
+        return scenario_markdown(self)
+
+
+def lifted(scenario: Scenario) -> Scenario:
+    """The scenario without its environment contacts: the object lies there, but is to come off."""
+    rests = {Rest(s.geom, s.surface, s.friction) for s in scenario.supports}
+    rests |= set(scenario.rests)
+    ordered = tuple(sorted(rests, key=lambda rest: (rest.surface, rest.geom)))
+    return replace(scenario, supports=(), rests=ordered, holdable=False)

@@ -1,0 +1,1 @@
+"""What passes between the parts of the loop at run time, and the trace of it all."""

@@ -1,0 +1,117 @@
+"""The trace of a run: everything that happened, one row per physics step."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, fields
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fulcrum.synthesis.arrays import Array
+
+
+def stretches(flags: Array) -> NDArray[np.intp]:
+    """How many steps in a row a flag has been set at each step, (k,) of (k,)."""
+    steps = np.arange(1, len(flags) + 1)
+    return steps - np.maximum.accumulate(np.where(flags > 0.0, 0, steps))
+
+
+@dataclass(frozen=True, eq=False)
+class Trace:
+    """Arrays over k steps, l joints, n hands and m contacts (hands first); SI units, world axes.
+
+    Row i holds the state before step i, and the torques and contact forces during it.
+
+    Attributes:
+        t: (k,).
+        phase: Index of the phase, (k,).
+        mode: Number of the :class:`sim.signals.event.Mode`, (k,).
+        tilt_ref, rate_ref: Reference tilt [rad] and its rate [rad/s], (k,).
+        tilt: Measured tilt [rad], (k,).
+        p_WO, quat_WO, twist_WO: Object pose and twist (linear first), (k, 3 | 4 | 6).
+        q, qd, q_ref: Joint state and reference, (k, l).
+        tau: Applied torques, (k, l).
+        saturated: Torques that were cut at their limit, (k, l).
+        p_WE, quat_WE, twist_WE: Tip poses and twists, (k, n, 3 | 4 | 6).
+        p_WC: Where the plant's contacts are, (k, m, 3); the last place where there is none.
+        f_W: Force on the object and torsional moment about the normal into it, (k, m, 4).
+        w_command_C: Commanded wrenches on the object in contact axes, (k, m, 6).
+        synthesis_s: Wall time of the synthesis; 0 where none was due, (k,).
+        failed: Syntheses without solution, (k,).
+        collisions: Contacts that the scenario does not want, (k,).
+    """
+
+    t: Array
+    phase: Array
+    mode: Array
+    tilt_ref: Array
+    rate_ref: Array
+    tilt: Array
+    p_WO: Array
+    quat_WO: Array
+    twist_WO: Array
+    q: Array
+    qd: Array
+    q_ref: Array
+    tau: Array
+    saturated: Array
+    p_WE: Array
+    quat_WE: Array
+    twist_WE: Array
+    p_WC: Array
+    f_W: Array
+    w_command_C: Array
+    synthesis_s: Array
+    failed: Array
+    collisions: Array
+
+    @staticmethod
+    def allocate(steps: int, joints: int, hands: int, contacts: int) -> Trace:
+        """An all-zero trace, to be filled row by row."""
+        numbers = [
+            "t",
+            "phase",
+            "mode",
+            "tilt_ref",
+            "rate_ref",
+            "tilt",
+            "synthesis_s",
+            "failed",
+            "collisions",
+        ]
+        shapes = {
+            **dict.fromkeys(numbers, ()),
+            **dict.fromkeys(("q", "qd", "q_ref", "tau", "saturated"), (joints,)),
+            "p_WO": (3,),
+            "quat_WO": (4,),
+            "twist_WO": (6,),
+            "p_WE": (hands, 3),
+            "quat_WE": (hands, 4),
+            "twist_WE": (hands, 6),
+            "p_WC": (contacts, 3),
+            "f_W": (contacts, 4),
+            "w_command_C": (contacts, 6),
+        }
+        return Trace(**{name: np.zeros((steps, *shape)) for name, shape in shapes.items()})
+
+    def grown(self, steps: int) -> Trace:
+        """A copy with room for so many steps more, all-zero."""
+        arrays = {f.name: getattr(self, f.name) for f in fields(self)}
+        room = {n: np.zeros((steps, *array.shape[1:])) for n, array in arrays.items()}
+        return Trace(**{n: np.concatenate([array, room[n]]) for n, array in arrays.items()})
+
+    def __len__(self) -> int:
+        return len(self.t)
+
+    def rows(self, start: int, stop: int) -> Trace:
+        """Views of the rows from start to before stop."""
+        return Trace(**{f.name: getattr(self, f.name)[start:stop] for f in fields(self)})
+
+    def pick(self, rows: NDArray[np.intp]) -> Trace:
+        """Copies of the rows with the given indices."""
+        return Trace(**{f.name: getattr(self, f.name)[rows] for f in fields(self)})
+
+
+def torque_shares(tau: Array, tau_min: Array, tau_max: Array) -> Array:
+    """Sizes of torques, (..., l), over the limits on their side [-]."""
+    return np.maximum(tau / tau_max, tau / tau_min)

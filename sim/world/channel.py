@@ -1,0 +1,38 @@
+"""The wire from the outer loop to the drives: what is sent arrives late, or not at all."""
+
+from __future__ import annotations
+
+from collections import deque
+
+import numpy as np
+
+from fulcrum.sim.signals.setpoint import Setpoint
+from fulcrum.sim.world.faults import FaultKind, of_kinds
+from fulcrum.sim.world.world import World
+
+
+class Channel:
+    """Delivers setpoints after the world's latency; some get lost."""
+
+    def __init__(self, world: World) -> None:
+        self._latency, self._dropped = world.latency, world.dropped
+        self._random = np.random.default_rng([world.seed, 2])
+        self._silences = of_kinds(world.faults, FaultKind.SILENCE)
+        self._sent: deque[tuple[float, Setpoint]] = deque()
+
+    def send(self, t: float, setpoint: Setpoint) -> None:
+        """Takes a setpoint that was worked out from the measurement at a time [s]."""
+        if self._dropped > 0.0 and self._random.random() < self._dropped:
+            return
+        self._sent.append((t + self._latency, setpoint))
+
+    def receive(self, t: float) -> Setpoint | None:
+        """The newest setpoint that has arrived since last asked; None if there is none."""
+        newest = None
+        for silence in self._silences:
+            if silence.active(t):
+                return None
+        # Times are sums of steps, and so is the latency: half a nanosecond is rounding.
+        while self._sent and self._sent[0][0] <= t + 5e-10:
+            newest = self._sent.popleft()[1]
+        return newest

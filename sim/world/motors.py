@@ -1,0 +1,42 @@
+"""What the motors make of the torques they are asked for."""
+
+from __future__ import annotations
+
+import warnings
+
+import numpy as np
+
+from fulcrum.sim.world.faults import Fault, FaultKind, of_kinds
+from fulcrum.sim.world.world import World
+from fulcrum.synthesis.arrays import Array
+
+with warnings.catch_warnings():  # dm_control looks for a display on import; none is needed
+    warnings.simplefilter("ignore")
+
+
+class Motors:
+    """What the motors make of the torques they are asked for."""
+
+    def __init__(self, world: World, limits: Array, joints: tuple[str, ...]) -> None:
+        """Takes over what is true of the l motors, their limits, and their joints' names."""
+        self._gain, self._offset = np.array(world.torque_gain), np.array(world.torque_offset)
+        self._noise = world.torque_noise * limits
+        self._noisy = world.torque_noise > 0.0
+        self._random = np.random.default_rng([world.seed, 3])
+        self._joints = joints
+        self._faults = of_kinds(world.faults, FaultKind.TORQUE_LOST, FaultKind.TORQUE_STUCK)
+        self._stuck: dict[Fault, float] = {}
+
+    def torques(self, t: float, tau: Array) -> Array:
+        """Torques at the joints [N·m or N], (l,), before the motors saturate, at a time [s]."""
+        made = self._gain * tau if self._gain.size else tau.copy()
+        if self._offset.size:
+            made += self._offset
+        if self._noisy:
+            made += self._noise * self._random.standard_normal(len(tau))
+        for fault in self._faults:
+            if fault.active(t):
+                joint = self._joints.index(fault.joint)
+                lost = fault.kind is FaultKind.TORQUE_LOST
+                made[joint] = 0.0 if lost else self._stuck.setdefault(fault, float(made[joint]))
+        return made

@@ -1,0 +1,210 @@
+"""What a real cell brings, as ranges: worlds are drawn from them by seed."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+
+import mujoco
+import numpy as np
+
+from fulcrum.sim.model.scene import compose
+from fulcrum.sim.motion.schedule import Schedule
+from fulcrum.sim.scenario.scenario import Scenario
+from fulcrum.sim.world.world import Push, World
+from fulcrum.synthesis import InvalidInputError
+from fulcrum.synthesis.arrays import Array
+from fulcrum.synthesis.checks import each, not_negative, whole
+
+# More pushes than this in one manoeuvre are a mistake.
+_MOST_PUSHES = 1000
+
+
+@dataclass(frozen=True)
+class Uncertainty:
+    """Ranges of a :class:`sim.world.world.World`; "+-" is uniform on both sides, "noise" Gaussian.
+
+    Attributes:
+        mass: +- share of the object's mass [-].
+        center_of_mass: +- along each of the object's axes [m].
+        size: +- share of the object's size [-].
+        friction_down, friction_up: Shares by which friction may be less, or more, at each pair of
+            surfaces, independently [-].
+        hand_place: +- along both tangents of each hand's contact [m].
+        link_mass: +- share of the mass of each driven link [-].
+        joint_friction: Dry friction of each joint, up to this share of its torque limit [-].
+        torque_gain: +- share of each motor's torque [-].
+        torque_offset: +- of each motor, as a share of its limit [-].
+        torque_noise: Of each motor, as a share of its limit [-].
+        encoder_noise: [rad or m].
+        position_noise: Of the object, per axis [m].
+        orientation_noise: Of the object, per axis [rad].
+        latency: Of the outer loop [s].
+        dropped: Share of the outer loop's ticks that get lost [-].
+        pushes: How many pushes there are while the object is held with full grip.
+        push: Largest force of a push [N]; direction and place on the object are random.
+        push_s: Duration of a push [s].
+    """
+
+    mass: float = 0.0
+    center_of_mass: float = 0.0
+    size: float = 0.0
+    friction_down: float = 0.0
+    friction_up: float = 0.0
+    hand_place: float = 0.0
+    link_mass: float = 0.0
+    joint_friction: float = 0.0
+    torque_gain: float = 0.0
+    torque_offset: float = 0.0
+    torque_noise: float = 0.0
+    encoder_noise: float = 0.0
+    position_noise: float = 0.0
+    orientation_noise: float = 0.0
+    latency: float = 0.0
+    dropped: float = 0.0
+    pushes: int = 0
+    push: float = 0.0
+    push_s: float = 0.2
+
+    def __post_init__(self) -> None:
+        each("uncertainty", self, not_negative)
+        for name in ("mass", "size", "friction_down", "link_mass", "torque_gain", "dropped"):
+            if not getattr(self, name) < 1.0:
+                raise InvalidInputError(f"uncertainty.{name}", getattr(self, name), "in [0, 1)")
+        whole("uncertainty.pushes", self.pushes, least=0)
+        if self.pushes > _MOST_PUSHES:
+            raise InvalidInputError("uncertainty.pushes", self.pushes, f"at most {_MOST_PUSHES}")
+
+
+NOMINAL = Uncertainty()
+LAB = Uncertainty(
+    mass=0.10,
+    center_of_mass=0.010,
+    friction_down=0.15,
+    friction_up=0.20,
+    position_noise=0.0005,
+    orientation_noise=math.radians(0.2),
+    latency=0.001,
+    torque_gain=0.02,
+)
+FIELD = Uncertainty(
+    mass=0.20,
+    center_of_mass=0.020,
+    friction_down=0.20,
+    friction_up=0.20,
+    hand_place=0.005,
+    position_noise=0.001,
+    orientation_noise=math.radians(0.5),
+    latency=0.002,
+    dropped=0.01,
+    torque_gain=0.05,
+    pushes=2,
+    push=5.0,
+)
+HARSH = replace(
+    FIELD,
+    mass=0.30,
+    center_of_mass=0.030,
+    friction_down=0.30,
+    friction_up=0.30,
+    hand_place=0.010,
+    latency=0.005,
+    torque_gain=0.10,
+    push=10.0,
+)
+PRESETS = {"nominal": NOMINAL, "lab": LAB, "field": FIELD, "harsh": HARSH}
+
+
+def preset(name: str) -> Uncertainty:
+    """A named preset.
+
+    Raises:
+        InvalidInputError: There is none of that name.
+    """
+    if name not in PRESETS:
+        raise InvalidInputError("preset", name, f"one of {', '.join(PRESETS)}")
+    return PRESETS[name]
+
+
+def draw(uncertainty: Uncertainty, scenario: Scenario, seed: int) -> World:
+    """The world of a seed: the same for the same arguments.
+
+    Raises:
+        InvalidInputError: The seed is negative.
+    """
+    whole("seed", seed, least=0)
+    u, random = uncertainty, np.random.default_rng(seed)
+    scene = compose(scenario).compile()
+    limits = scene.actuator_ctrlrange[:, 1]
+    joints, contacts = len(limits), len(scenario.contact_names)
+
+    def within(half: float, size: int) -> Array:
+        return half * random.uniform(-1.0, 1.0, size)
+
+    # In the order of the fields; one added later goes last, or every world changes.
+    mass = 1.0 + float(within(u.mass, 1)[0])
+    center = within(u.center_of_mass, 3)
+    size = 1.0 + float(within(u.size, 1)[0])
+    friction = 1.0 + random.uniform(-u.friction_down, u.friction_up, contacts)
+    places = within(u.hand_place, 2 * len(scenario.hands)).reshape(-1, 2)
+    link_mass = 1.0 + within(u.link_mass, joints)
+    joint_friction = u.joint_friction * limits * random.uniform(0.0, 1.0, joints)
+    gain = 1.0 + within(u.torque_gain, joints)
+    offset = within(u.torque_offset, joints) * limits
+    pushes = tuple(_push(u, scenario, scene, random) for _ in range(u.pushes))
+    return World(
+        seed=seed,
+        mass=mass,
+        center_of_mass=(float(center[0]), float(center[1]), float(center[2])),
+        size=size,
+        friction=_one_per_pair(scenario, friction),
+        hand_place=tuple((float(t), float(o)) for t, o in places),
+        link_mass=tuple(link_mass.tolist()),
+        joint_friction=tuple(joint_friction.tolist()) if u.joint_friction else (),
+        torque_gain=tuple(gain.tolist()),
+        torque_offset=tuple(offset.tolist()),
+        torque_noise=u.torque_noise,
+        encoder_noise=u.encoder_noise,
+        position_noise=u.position_noise,
+        orientation_noise=u.orientation_noise,
+        latency=u.latency,
+        dropped=u.dropped,
+        pushes=pushes,
+    )
+
+
+def _one_per_pair(scenario: Scenario, friction: Array) -> tuple[float, ...]:
+    """Contacts of the same two surfaces share the friction of the first of them."""
+    pairs = [(hand.name, hand.geom) for hand in scenario.hands]
+    pairs += [(support.surface, support.geom) for support in scenario.supports]
+    return tuple(float(friction[pairs.index(pair)]) for pair in pairs)
+
+
+def _push(
+    u: Uncertainty, scenario: Scenario, scene: mujoco.MjModel, random: np.random.Generator
+) -> Push:
+    """At any time while the object is held, in any direction, anywhere within its bounds."""
+    schedule = Schedule(scenario)
+    held = np.flatnonzero(schedule.held)
+    first, last = (schedule.starts[held[0]], schedule.ends[held[-1]]) if len(held) else (0.0, 0.0)
+    t = float(random.uniform(first, last))
+    direction = random.normal(size=3)
+    force = u.push * random.uniform() * direction / np.linalg.norm(direction)
+    low, high = _bounds(scenario, scene)
+    x, y, z = force.tolist()
+    a, b, c = random.uniform(low, high).tolist()
+    return Push(t, u.push_s, (x, y, z), (a, b, c))
+
+
+def _bounds(scenario: Scenario, scene: mujoco.MjModel) -> tuple[Array, Array]:
+    """Opposite corners of the bounds of the object's geoms, in the object frame [m]."""
+    corners = []
+    for name in (geom.name for geom in scenario.object.geoms):
+        geom = scene.geom(name)
+        center, half = scene.geom_aabb[geom.id].reshape(2, 3)
+        R = np.zeros(9)
+        mujoco.mju_quat2Mat(R, geom.quat)
+        signs = np.array(np.meshgrid(*[(-1.0, 1.0)] * 3)).reshape(3, -1).T
+        corners.append(geom.pos + (center + signs * half) @ R.reshape(3, 3).T)
+    points = np.concatenate(corners)
+    return points.min(axis=0), points.max(axis=0)

@@ -1,0 +1,80 @@
+"""What the controller sees of the plant's state: the truth, with noise, or what is broken."""
+
+from __future__ import annotations
+
+import mujoco
+import numpy as np
+
+from fulcrum.sim.signals.measurement import Measurement
+from fulcrum.sim.world.faults import Fault, FaultKind, of_kinds
+from fulcrum.sim.world.world import World
+from fulcrum.synthesis.arrays import Array
+
+# Speeds come from angles through a filter of this bandwidth, which makes noise of their noise.
+_SPEED_FILTER = 100.0  # [rad/s]
+
+
+class Sensors:
+    """Encoders and the tracking of the object."""
+
+    def __init__(self, world: World, joints: tuple[str, ...]) -> None:
+        """Takes over what is true, and the names of the l joints that are measured."""
+        self._world, self._joints = world, joints
+        encoders = FaultKind.ENCODER_FROZEN, FaultKind.ENCODER_DEAD
+        self._encoder_faults = of_kinds(world.faults, *encoders)
+        self._pose_faults = of_kinds(world.faults, FaultKind.POSE_FROZEN, FaultKind.POSE_DEAD)
+        self._frozen: dict[Fault, Array] = {}
+        self._random = np.random.default_rng([world.seed, 1])
+        # Of angles, speeds, position and turn, as far as they are noisy: one draw for all of them.
+        deviations = [
+            np.full(len(joints), world.encoder_noise),
+            np.full(len(joints), world.encoder_noise * _SPEED_FILTER),
+            np.full(3, world.position_noise),
+            np.full(3, world.orientation_noise),
+        ]
+        flat = np.concatenate(deviations)
+        self._deviations = flat[flat > 0.0]
+
+    def see(self, truth: Measurement) -> Measurement:
+        """The measurement as the controller gets it."""
+        if self._deviations.size:
+            self._add_noise(truth)
+        if self._encoder_faults:
+            self._break_encoders(truth)
+        if self._pose_faults:
+            self._break_tracking(truth)
+        return truth
+
+    def _add_noise(self, seen: Measurement) -> None:
+        world, joints = self._world, len(self._joints)
+        noise = self._deviations * self._random.standard_normal(len(self._deviations))
+        if world.encoder_noise > 0.0:
+            seen.q, seen.qd = seen.q + noise[:joints], seen.qd + noise[joints : 2 * joints]
+            noise = noise[2 * joints :]
+        if world.position_noise > 0.0:
+            seen.p_WO = seen.p_WO + noise[:3]
+        if world.orientation_noise > 0.0:
+            turned = seen.quat_WO.copy()
+            mujoco.mju_quatIntegrate(turned, noise[-3:], 1.0)
+            seen.quat_WO = turned
+
+    def _break_encoders(self, seen: Measurement) -> None:
+        states = np.array([seen.q, seen.qd])
+        for fault in self._encoder_faults:
+            if fault.active(seen.t):
+                joint = self._joints.index(fault.joint)
+                states[:, joint] = self._broken(fault, states[:, joint])
+        seen.q, seen.qd = states
+
+    def _break_tracking(self, seen: Measurement) -> None:
+        pose = np.concatenate([seen.p_WO, seen.quat_WO])
+        for fault in self._pose_faults:
+            if fault.active(seen.t):
+                pose = self._broken(fault, pose)
+        seen.p_WO, seen.quat_WO = pose[:3], pose[3:]
+
+    def _broken(self, fault: Fault, values: Array) -> Array:
+        """What a sensor gives instead of these values: the first that it froze at, or NaN."""
+        if fault.kind in (FaultKind.ENCODER_DEAD, FaultKind.POSE_DEAD):
+            return np.full_like(values, np.nan)
+        return self._frozen.setdefault(fault, values.copy()).copy()

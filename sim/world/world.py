@@ -1,0 +1,225 @@
+"""One world: what is true of a plant beyond the belief about it, and what disturbs it.
+
+Truth goes to the plant, its sensors and its wires alone; the controller keeps its belief.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import mujoco
+import numpy as np
+
+from fulcrum.sim.geometry.geom import Geom
+from fulcrum.sim.geometry.object import Object
+from fulcrum.sim.geometry.pose import Vector, triple
+from fulcrum.sim.model.contacts import contact_axes
+from fulcrum.sim.model.scene import hand_body, tip_site
+from fulcrum.sim.scenario.contacts import Friction, Hand, Rest, Support
+from fulcrum.sim.scenario.scenario import Scenario
+from fulcrum.sim.world.faults import Fault
+from fulcrum.synthesis import InvalidInputError
+from fulcrum.synthesis.checks import finite, not_negative, positive, vector
+
+
+@dataclass(frozen=True)
+class Push:
+    """A force on the object for a while, as of somebody who bumps into it.
+
+    Attributes:
+        t: When it begins [s].
+        duration_s: [s].
+        force_W: In world axes [N].
+        p_OA_O: Where it acts, in the object frame [m].
+    """
+
+    t: float
+    duration_s: float
+    force_W: Vector
+    p_OA_O: Vector
+
+    def __post_init__(self) -> None:
+        not_negative("push.t", self.t)
+        positive("push.duration_s", self.duration_s)
+        vector("push.force_W", self.force_W, 3)
+        vector("push.p_OA_O", self.p_OA_O, 3)
+
+
+@dataclass(frozen=True)
+class World:
+    """How the truth deviates from a scenario; the default deviates in nothing.
+
+    Empty tuples stand for no deviation at all.
+
+    Attributes:
+        seed: Draws the noise and the dropped ticks.
+        mass: Of the object, as a factor [-].
+        center_of_mass: Of the object, added to the believed one, in the object frame [m].
+        size: Of the object about its pivot, as a factor [-]; its edges and faces move with it.
+        friction: Factors on the friction of each contact, hands first [-], (m,).
+        hand_place: How far along (t, o) from its place on the wrist each hand's tip really is [m],
+            (n, 2): so far from the believed contact it touches.
+        link_mass: Factors on mass and inertia of the link behind each driven joint [-], (l,).
+        joint_friction: Dry friction of each driven joint [N·m or N], (l,).
+        torque_gain: What each motor makes of a commanded torque [-], (l,).
+        torque_offset: What it adds [N·m or N], (l,).
+        torque_noise: Standard deviation of each motor's torque at every physics step, as a share
+            of its limit [-].
+        encoder_noise: Standard deviation of the angles that the controller sees [rad or m].
+        position_noise: Standard deviation of the object's position, per axis, at every step [m].
+        orientation_noise: Standard deviation of its turn, per axis, at every step [rad].
+        latency: Time from measurement to effect of the outer loop [s].
+        dropped: Share of the outer loop's ticks whose results get lost [-].
+        pushes: Forces on the object.
+        obstacles: What stands in the world besides the environment that is believed.
+        faults: What breaks during the run.
+    """
+
+    seed: int = 0
+    mass: float = 1.0
+    center_of_mass: Vector = (0.0, 0.0, 0.0)
+    size: float = 1.0
+    friction: tuple[float, ...] = ()
+    hand_place: tuple[tuple[float, float], ...] = ()
+    link_mass: tuple[float, ...] = ()
+    joint_friction: tuple[float, ...] = ()
+    torque_gain: tuple[float, ...] = ()
+    torque_offset: tuple[float, ...] = ()
+    torque_noise: float = 0.0
+    encoder_noise: float = 0.0
+    position_noise: float = 0.0
+    orientation_noise: float = 0.0
+    latency: float = 0.0
+    dropped: float = 0.0
+    pushes: tuple[Push, ...] = ()
+    obstacles: tuple[Geom, ...] = ()
+    faults: tuple[Fault, ...] = ()
+
+    def __post_init__(self) -> None:
+        if self.seed < 0:
+            raise InvalidInputError("world.seed", self.seed, "an integer >= 0")
+        positive("world.mass", self.mass)
+        if not 1e-3 <= self.size <= 1e3:  # its square is to be a number
+            raise InvalidInputError("world.size", self.size, "in [0.001, 1000]")
+        vector("world.center_of_mass", self.center_of_mass, 3)
+        for name in ("friction", "link_mass", "torque_gain"):
+            for factor in getattr(self, name):
+                positive(f"world.{name}", factor)
+        for friction in self.joint_friction:
+            not_negative("world.joint_friction", friction)
+        finite("world.torque_offset", self.torque_offset)
+        for place in self.hand_place:
+            vector("world.hand_place", place, 2)
+        for name in ("torque_noise", "encoder_noise", "position_noise", "orientation_noise"):
+            not_negative(f"world.{name}", getattr(self, name))
+        not_negative("world.latency", self.latency)
+        if not 0.0 <= self.dropped < 1.0:
+            raise InvalidInputError("world.dropped", self.dropped, "in [0, 1)")
+
+    def truth(self, scenario: Scenario) -> Scenario:
+        """The scenario as it truly is: object, contacts, and where the object lies.
+
+        Raises:
+            InvalidInputError: A tuple has another length than the scenario asks for.
+        """
+        n, contacts = len(scenario.hands), len(scenario.contact_names)
+        _check_length("friction", self.friction, contacts)
+        _check_length("hand_place", self.hand_place, n)
+        friction = self.friction or (1.0,) * contacts
+        places = self.hand_place or ((0.0, 0.0),) * n
+        hands = tuple(map(self._hand, scenario.hands, friction[:n], places))
+        supports = tuple(map(self._support, scenario.supports, friction[n:]))
+        return replace(
+            scenario,
+            object=self._object(scenario.object),
+            environment=(*scenario.environment, *self.obstacles),
+            hands=hands,
+            supports=supports,
+            rests=tuple(_rest(rest, supports) for rest in scenario.rests),
+            path=scenario.path.scaled(self.size),
+        )
+
+    def _object(self, thing: Object) -> Object:
+        geoms = tuple(
+            replace(
+                geom,
+                size=tuple(self.size * size for size in geom.size),
+                pose=replace(geom.pose, position=_scaled(self.size, geom.pose.position)),
+            )
+            for geom in thing.geoms
+        )
+        center = self.size * np.asarray(thing.center_of_mass) + self.center_of_mass
+        return replace(
+            thing,
+            mass=self.mass * thing.mass,
+            inertia=_scaled(self.mass * self.size**2, thing.inertia),
+            geoms=geoms,
+            center_of_mass=triple(center),
+            shape=None if thing.shape is None else thing.shape.scaled(self.size),
+        )
+
+    def _hand(self, hand: Hand, friction: float, place: tuple[float, float]) -> Hand:
+        p_OC_O = self.size * np.asarray(hand.p_OC_O)
+        p_OC_O += contact_axes(hand.normal_O, hand.tangent_O)[:, :2] @ place
+        return replace(hand, friction=_slipperier(hand.friction, friction), p_OC_O=triple(p_OC_O))
+
+    def _support(self, support: Support, friction: float) -> Support:
+        return replace(
+            support,
+            friction=_slipperier(support.friction, friction),
+            p_OP_O=_scaled(self.size, support.p_OP_O),
+        )
+
+    def change(self, scenario: Scenario, model: mujoco.MjModel) -> None:
+        """Makes a compiled scene's robot what it truly is: hands on wrists, masses, friction.
+
+        Raises:
+            InvalidInputError: A tuple has another length than the robot has driven joints.
+        """
+        joints = [int(model.actuator(i).trnid[0]) for i in range(model.nu)]
+        for name in ("link_mass", "joint_friction", "torque_gain", "torque_offset"):
+            _check_length(name, getattr(self, name), len(joints))
+        names = [model.joint(joint).name for joint in joints]
+        for fault in self.faults:
+            if fault.joint and fault.joint not in names:
+                raise InvalidInputError("fault.joint", fault.joint, f"one of {', '.join(names)}")
+        for hand, place in zip(scenario.hands, self.hand_place, strict=False):
+            pad, site = model.body(hand_body(hand)).id, model.site(tip_site(hand)).id
+            offset = np.array([*place, 0.0])
+            for quaternion in (model.site_quat[site], model.body_quat[pad]):
+                mujoco.mju_rotVecQuat(offset, offset.copy(), quaternion)
+            model.body_pos[pad] += offset
+        for joint, factor in zip(joints, self.link_mass, strict=False):
+            body = model.jnt_bodyid[joint]
+            model.body_mass[body] *= factor
+            model.body_inertia[body] *= factor
+        dofs = model.jnt_dofadr[joints]
+        if self.joint_friction:
+            model.dof_frictionloss[dofs] = self.joint_friction
+        mujoco.mj_setConst(model, mujoco.MjData(model))
+
+
+# The truth is as believed.
+NO_DEVIATION = World()
+
+
+def _check_length(name: str, values: tuple, length: int) -> None:
+    if values and len(values) != length:
+        raise InvalidInputError(f"world.{name}", f"{len(values)} values", f"none or {length}")
+
+
+def _slipperier(friction: Friction, factor: float) -> Friction:
+    return replace(friction, mu=factor * friction.mu)
+
+
+def _rest(rest: Rest, supports: tuple[Support, ...]) -> Rest:
+    """A place of rest with the friction of the supports on the same pair of geoms, if any."""
+    for support in supports:
+        if (support.geom, support.surface) == (rest.geom, rest.surface):
+            return replace(rest, friction=support.friction)
+    return rest
+
+
+def _scaled(factor: float, vector: Vector) -> Vector:
+    x, y, z = vector
+    return (factor * x, factor * y, factor * z)

@@ -1,0 +1,1 @@
+"""Robots move heavy objects by leaning them on their surroundings: a closed-loop testbed."""

@@ -1,0 +1,7 @@
+"""`python -m fulcrum`."""
+
+import sys
+
+from fulcrum.scenarios.cli import main
+
+sys.exit(main())

@@ -1,0 +1,1 @@
+"""What a problem's solution or infeasibility means: sensitivities, relaxations, conflicts."""

@@ -1,0 +1,118 @@
+"""Rows of a sparse conic program, added block by block, which remember what they stand for."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import clarabel
+import numpy as np
+import scipy.sparse as sp
+from numpy.typing import NDArray
+
+from fulcrum.synthesis.arrays import Array
+
+Indices = NDArray[np.intp]
+
+
+@dataclass(frozen=True, eq=False)
+class Group:
+    """Rows that stand for constraints of the same kinds at several places.
+
+    Attributes:
+        rows: (places, r).
+        s: Where on the path, (places,); NaN for what concerns all of it.
+        names: Of the r rows at each of the places, or once for all of them; empty for rows that are
+            no limits.
+        scale: How large what the rows are scaled by is in units that all rows have in common,
+            (places,), or once for all of them.
+    """
+
+    rows: Indices
+    s: Array
+    names: list[list[str]]
+    scale: Array | float = 1.0
+
+
+class Rows:
+    r"""Data of :math:`Ax + s = h,\ s \in \mathcal{K}`: equalities, inequalities, cones, in order.
+
+    Attributes:
+        cones: Clarabel's cones.
+        groups: What the rows stand for.
+    """
+
+    def __init__(self) -> None:
+        self.cones: list[clarabel.ZeroConeT] = []
+        self.groups: list[Group] = []
+        self._entries: list[tuple[Array, Indices, Indices]] = []
+        self._h: list[Array] = []
+        self._shifts: list[tuple[Indices, Array]] = []
+        self._count = 0
+        self._nonnegative = slice(0, 0)
+        self._second_order: list[Indices] = []
+
+    def new(self, h: Array, s: Array, *names: list[str], scale: Array | float = 1.0) -> Indices:
+        """Row numbers, (places, r), for right-hand sides of that shape, at places s, (places,)."""
+        rows = self._count + np.arange(h.size).reshape(h.shape)
+        self._count += h.size
+        self._h.append(h.ravel())
+        self.groups.append(Group(rows, s, list(names), scale))
+        return rows
+
+    def add(self, data: Array | float, rows: Indices, columns: Indices) -> None:
+        """Entries, broadcast against one another; entries at the same place add up."""
+        data, rows, columns = np.broadcast_arrays(data, rows, columns)
+        self._entries.append((data.ravel(), rows.ravel(), columns.ravel()))
+
+    def shift(self, rows: Indices, constant: Array) -> None:
+        """A constant, in the shape of the rows, that is added to what stands left of h."""
+        self._shifts.append((rows.ravel(), constant.ravel()))
+
+    def add_block(self, A: Array, rows: Indices, columns: Indices) -> None:
+        """Matrices A, (places, r, k), in rows, (places, r), and columns, (places, k)."""
+        r, k = np.nonzero((A != 0.0).any(axis=0))
+        self.add(A[:, r, k], rows[:, r], columns[:, k])
+
+    def end_equalities(self) -> None:
+        """What has been added so far are equalities."""
+        self.cones.append(clarabel.ZeroConeT(self._count))
+        self._nonnegative = slice(self._count, self._count)
+
+    def end_inequalities(self) -> None:
+        """What has been added since are inequalities."""
+        self._nonnegative = slice(self._nonnegative.start, self._count)
+        if count := self._count - self._nonnegative.start:
+            self.cones.append(clarabel.NonnegativeConeT(count))
+
+    def second_order(self, rows: Indices) -> None:
+        """The next rows, (cones, k), are second-order cones, each with its head first."""
+        self.cones += [clarabel.SecondOrderConeT(rows.shape[1])] * len(rows)
+        self._second_order.append(rows)
+
+    def data(self, columns: int) -> tuple[sp.csc_matrix, Array]:
+        """A and h."""
+        data, rows, where = (np.concatenate(each) for each in zip(*self._entries, strict=True))
+        A = sp.csc_matrix((data, (rows, where)), shape=(self._count, columns))
+        h = np.concatenate(self._h)
+        for rows_shifted, constant in self._shifts:
+            np.subtract.at(h, rows_shifted, constant)
+        return A, h
+
+    def dual_violation(self, z: Array) -> float:
+        """How far multipliers lie outside the dual cones; 0 or less inside."""
+        worst = float(-z[self._nonnegative].min(initial=0.0))
+        for rows in self._second_order:
+            outside = np.linalg.norm(z[rows[:, 1:]], axis=1) - z[rows[:, 0]]
+            worst = max(worst, float(outside.max()))
+        return worst
+
+    def weights(self, z: Array) -> Iterator[tuple[float, float, str]]:
+        """Size of the multiplier of each row that is a limit's, its place and its name."""
+        for group in self.groups:
+            scale = np.broadcast_to(group.scale, group.s.shape)
+            for k, (rows, s) in enumerate(zip(group.rows, group.s, strict=True)):
+                names = group.names[k if len(group.names) > 1 else 0]
+                for row, name in zip(rows, names, strict=True):
+                    if name:
+                        yield abs(float(z[row] / scale[k])), float(s), name

@@ -1,0 +1,1 @@
+"""Grips that serve every world of an uncertainty set, and proofs that none does."""

@@ -1,0 +1,262 @@
+"""A planned tilt in closed loop: the bars, what they rest on, and what is planned anew."""
+
+import json
+import math
+import pickle
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from fulcrum.scenarios import scenario
+from fulcrum.scenarios.cli import main
+from fulcrum.scenarios.commands.common import chosen_planning
+from fulcrum.sim.control.replanning import Replanner
+from fulcrum.sim.motion.references import References
+from fulcrum.sim.planning.execution import Planning, planned_tilt
+from fulcrum.sim.run.execute import Request, execute
+from fulcrum.sim.run.preparation import Preparation
+from fulcrum.sim.scenario.control import controllers
+from fulcrum.sim.scenario.phases import Phase
+from fulcrum.sim.signals.measurement import Measurement
+from fulcrum.sim.sweep.design import Sweep
+from fulcrum.sim.sweep.episode import run_episode
+from fulcrum.sim.world.faults import Fault, FaultKind
+from fulcrum.sim.world.world import World
+from fulcrum.synthesis import InvalidInputError
+from fulcrum.synthesis.arrays import N
+from fulcrum.synthesis.path.problem import PathObjective
+from tests.helpers.executions import broken, executed, executed_as, execution, longest
+from tests.helpers.plans import BOX, CYLINDER, fastest
+from tests.helpers.recordings import Content
+from tests.helpers.runs import rows_of, settled
+
+TICK = 0.001
+
+
+# --- the bars
+
+
+@pytest.mark.parametrize(("name", "stretch"), [(BOX, 1.0), (CYLINDER, 1.2)])
+def test_a_planned_tilt_is_executed_within_the_bars(name, stretch):
+    result = executed(name, stretch)
+    assert broken(name, result) == set()
+    assert result.report.verdict == "pass"
+    assert result.report.events == ()
+    lasted = np.count_nonzero(rows_of(name, result.trace, "tilt")) * TICK
+    # Phases begin at ticks.
+    assert lasted == pytest.approx(stretch * fastest(name).duration, abs=2 * TICK)
+    moving = rows_of(name, result.trace, "tilt")
+    pressed = result.trace.w_command_C[moving, : len(scenario(name).hands), N]
+    # Contacts are made once for every half degree, over which the grip may change.
+    off = np.radians(np.linspace(-0.5, 0.5, 21)[:, None]) + result.trace.tilt_ref[moving]
+    planned = execution(name, stretch).grip.at(off.ravel()).reshape(21, *pressed.shape)
+    assert (pressed >= planned.min(axis=0) - 0.05).all()
+
+
+def test_without_inertia_the_same_timing_breaks_them():
+    quasi_static = executed(BOX, 1.0, inertia=False)
+    assert broken(BOX, quasi_static) != set()
+    assert quasi_static.report.verdict == "fail"
+    counted = executed(BOX, 1.0)
+    worst = [np.abs(r.trace.tilt - r.trace.tilt_ref).max() for r in (quasi_static, counted)]
+    assert worst[0] > 2.0 * worst[1]
+
+
+def test_with_the_contacts_of_slow_runs_a_support_hops_and_nothing_else_changes():
+    chosen, planned = scenario(CYLINDER), execution(CYLINDER, 1.2)
+    slow = replace(planned, scenario=replace(planned.scenario, physics=chosen.physics))
+    control = controllers(chosen.control)["dynamic"]
+    request = Request(chosen, "dynamic", control, planning=Planning(1.2))
+    result = execute(request, prepared=Preparation.of(slow))
+    assert broken(CYLINDER, result) == {"contacts"}
+    lost = ~result.history.kept[settled(CYLINDER, result.trace)]
+    assert not lost[:, :2].any()
+    assert longest(lost) <= 3
+
+
+def test_the_longest_cut_is_found():
+    flags = np.array([[0, 1], [1, 1], [1, 0], [1, 1], [0, 1]], float)
+    assert (longest(flags), longest(0.0 * flags)) == (3, 0)
+
+
+def test_a_torque_may_be_cut_for_as_long_as_the_tolerances_say():
+    result = executed(BOX, 1.0)
+    scene = execution(BOX, 1.0).scenario
+    assert scene.tolerances.saturated_s == 0.02
+    assert 0 < longest(result.trace.saturated) <= 20
+    assert "cut" not in " ".join(result.report.failures)
+
+
+def test_a_robust_plan_bears_a_world_in_which_the_box_slips_without():
+    # Three quarters of the set that the plan serves: on its edge friction is used up.
+    world = World(mass=1.15, center_of_mass=(0.015, 0.0, -0.015), friction=(0.85,) * 4)
+    assert broken(BOX, executed_as(BOX, Planning(points=30, robust=True), world)) == set()
+    assert "slip" in broken(BOX, executed(BOX, 1.0, world))
+
+
+def test_a_plan_for_another_objective_is_executed_too():
+    planning = Planning(points=30, objective=PathObjective.FRICTION_MARGIN, duration=1.6)
+    result = executed_as(BOX, planning)
+    assert broken(BOX, result) == set()
+    lasted = np.count_nonzero(rows_of(BOX, result.trace, "tilt")) * TICK
+    assert 1.2 * fastest(BOX).duration < lasted <= 1.6 + 2 * TICK
+
+
+def test_the_options_of_a_planning_make_it():
+    chosen = scenario(BOX)
+    asked = Planning(1.5, objective=PathObjective.LEAST_EFFORT, duration=3.0, robust=True)
+    assert asked.options == "--plan least-effort --stretch 1.5 --duration 3.0 --robust"
+    assert chosen_planning(chosen, "least-effort", 1.5, 3.0, True) == asked
+    assert chosen_planning(chosen, "least-effort", 1.0, None, False).duration == 8.0
+    assert math.isinf(chosen_planning(chosen, "least-time", 1.0, None, False).duration)
+    assert chosen_planning(chosen, None, 1.0, 3.0, False) is None
+
+
+# --- planned anew
+
+
+def test_a_held_tilt_goes_on_by_a_new_plan_from_rest():
+    start = execution(BOX, 1.0).joint_path.schedule.starts[execution(BOX, 1.0).phase]
+    silence = Fault(FaultKind.SILENCE, start + 0.5, duration_s=0.1)
+    result = executed(BOX, 1.0, World(faults=(silence,)))
+    assert [e.reaction for e in result.report.events] == ["hold", "run", "plan anew"]
+    assert broken(BOX, result) == set()
+    again = result.report.events[-1].t
+    trace = result.trace
+    after = (trace.t > again) & rows_of(BOX, trace, "tilt")
+    # From rest, with the new plan's acceleration at once, and without a jump of the tilt.
+    assert abs(trace.rate_ref[after][0]) < 0.05
+    assert np.diff(trace.tilt_ref).max() < 1.01 * TICK * trace.rate_ref.max()
+    assert trace.rate_ref[after].max() > 1.0
+
+
+@pytest.fixture
+def half_way():
+    """A planner of the rest, a target half way, and its path time."""
+    planned = execution(BOX, 1.5)
+    t = float(planned.joint_path.schedule.starts[planned.phase] + 0.8)
+    return Replanner(planned), References(planned.joint_path, TICK).at(t), t
+
+
+def seen(q, qd):
+    return Measurement(0.0, q, qd, np.zeros(3), np.array([1.0, 0.0, 0.0, 0.0]), 0.0 * q)
+
+
+def test_arms_on_their_path_keep_their_timing(half_way):
+    replanner, target, _ = half_way
+    assert replanner.caught(target, seen(target.q, target.qd)) is None
+    # Nor does it matter how they deviate across it.
+    slope = replanner.joint_path.at(replanner.phase, target.tilt / (math.pi / 2))[1]
+    across = np.ones_like(slope) - slope * slope.sum() / slope.dot(slope)
+    assert replanner.behind(target, seen(target.q - 0.1 * across, target.qd)) < 1e-12
+
+
+def test_arms_that_fell_behind_go_on_from_where_they_are(half_way):
+    replanner, target, t = half_way
+    end, phase = math.pi / 2, replanner.phase
+    share = (target.tilt - math.radians(2.0)) / end
+    q, slope = replanner.joint_path.at(phase, share)
+    ends = replanner.joint_path.schedule.ends[phase]
+    anew = replanner.caught(target, seen(q, 0.4 * slope))
+    schedule = anew.joint_path.schedule
+    # Two degrees of the path are curved a little: by 1 % of them.
+    assert schedule.at(anew.path_t).tilt == pytest.approx(share * end, abs=math.radians(0.02))
+    just = schedule.at(anew.path_t + 1e-6)
+    assert just.rate == pytest.approx(0.4, rel=1e-2)
+    assert anew.path_t < t
+    # What is behind and slower than planned takes longer, and ends at rest.
+    assert schedule.ends[phase] - anew.path_t > ends - t
+    last = schedule.at(schedule.ends[phase] - 1e-9)
+    assert (float(last.tilt), float(last.rate)) == pytest.approx((end, 0.0), abs=1e-6)
+
+
+def test_the_timing_stays_where_there_is_no_other(half_way):
+    replanner, _, _ = half_way
+    assert replanner.planned(0.9, 50.0) is None
+    assert replanner.planned(0.995, 0.1) is None
+    assert replanner.planned(0.9, 0.1) is not None
+
+
+def test_a_manoeuvre_in_two_tilts_is_refused():
+    chosen = scenario(BOX)
+    index = [phase.name for phase in chosen.phases].index("tilt")
+    half = Phase("half", 4.0, tilt=0.5, gap=0.0, grip=1.0)
+    phases = (*chosen.phases[:index], half, *chosen.phases[index:])
+    with pytest.raises(InvalidInputError, match="half"):
+        planned_tilt(replace(chosen, phases=phases), Planning())
+
+
+# --- commands and records
+
+
+def test_run_executes_a_plan_and_records_it_beside_what_was_measured(tmp_path, capsys):
+    arguments = ["--plan", "least-time", "--stretch", "1.5", "--out", str(tmp_path / "run")]
+    assert main(["run", CYLINDER, *arguments]) == 0
+    assert "controller dynamic: PASS" in capsys.readouterr().out
+    config = json.loads((tmp_path / "run" / "config.json").read_text())
+    assert config["planning"]["stretch"] == 1.5
+    content, plan = Content(tmp_path / "run" / "run.rrd"), execution(CYLINDER, 1.5).plan
+    _, tilt = content.series("plots/tilt", "Scalars:scalars")
+    times, forces = content.series("plots/normal_force/planned", "Scalars:scalars")
+    _, torques = content.series("plots/torque/planned", "Scalars:scalars")
+    _, rates = content.series("plots/tilt_rate", "Scalars:scalars")
+    rows = np.round(times / TICK).astype(int)
+    along = plan.along(np.radians(tilt[rows, 0]))
+    np.testing.assert_allclose(forces, along.w_OC_C[..., N], rtol=1e-9)
+    assert torques.shape == along.tau.shape
+    assert np.abs(torques).max() == pytest.approx(0.9, rel=1e-4)  # shares of the limits
+    # The plan's rates are the references', but that those are exact within an interval.
+    np.testing.assert_allclose(np.degrees(along.rate), rates[rows, 0], rtol=0, atol=1e-3)
+    assert np.abs(rates[:, 1] - rates[:, 0]).max() < 0.2 * rates[:, 0].max()
+
+
+def test_a_plan_over_the_tilt_is_the_plan_over_time():
+    planned = fastest(BOX)
+    moments = [planned.at(t) for t in np.linspace(0.01, 0.99, 23) * planned.duration]
+    along = planned.along(np.array([m.tilt for m in moments]))
+    np.testing.assert_allclose(along.rate, [m.rate for m in moments], rtol=1e-9)
+    np.testing.assert_allclose(along.w_OC_C, [m.w_OC_C for m in moments], rtol=0, atol=1e-9)
+    np.testing.assert_allclose(along.tau, [m.tau for m in moments], rtol=0, atol=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("wrong", "named"),
+    [
+        (["--plan", "most-time"], "least-time"),
+        (["--stretch", "2"], "--plan"),
+        (["--robust"], "--plan"),
+        (["--plan", "least-time", "--stretch", "0"], "stretch"),
+        (["--plan", "least-effort", "--duration", "0"], "duration"),
+    ],
+)
+def test_bad_options_are_refused_in_one_line(tmp_path, capsys, wrong, named):
+    assert main(["run", BOX, *wrong, "--out", str(tmp_path / "run")]) == 2
+    message = capsys.readouterr().err
+    assert message.count("\n") == 1
+    assert named in message
+
+
+@pytest.mark.parametrize("command", [["run"], ["sweep", "--episodes", "1"]])
+def test_where_there_is_no_plan_one_sentence_says_why(tmp_path, capsys, command):
+    out = ["--plan", "least-time", "--out", str(tmp_path / "out")]
+    assert main([command[0], "box-lift", *command[1:], *out]) == 1
+    assert capsys.readouterr().out.count("\n") == 1
+    assert not (tmp_path / "out").exists()
+
+
+def test_an_episode_of_a_sweep_executes_the_plan_and_its_replay_says_so():
+    planned = execution(CYLINDER, 1.2)
+    sweep = Sweep(
+        planned.scenario, ("dynamic",), "nominal", episodes=1, seed=0, planning=Planning(1.2)
+    )
+    (episode,) = sweep.all_episodes()
+    assert sweep.replay(episode) == (
+        "fulcrum run cylinder-tilt --controller dynamic --preset nominal --seed 0 "
+        "--plan least-time --stretch 1.2"
+    )
+    row = run_episode(pickle.dumps(sweep), episode)
+    assert row["success"]
+    # A world of the nominal preset deviates in nothing from what the other tests run.
+    assert row["tilt.max_error_deg"] == executed(CYLINDER, 1.2).report.tilt.max_error_deg
+    assert row["tilt.max_error_deg"] != executed(BOX, 1.0).report.tilt.max_error_deg

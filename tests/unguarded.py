@@ -1,8 +1,0 @@
-"""A guard that never finds anything by its thresholds: shared by tests of what happens without."""
-
-import math
-from dataclasses import fields
-
-from sim.settings import Guard
-
-UNGUARDED = Guard(**dict.fromkeys((field.name for field in fields(Guard)), math.inf))
