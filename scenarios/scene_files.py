@@ -10,13 +10,13 @@ from fulcrum.scenarios import scenarios
 from fulcrum.scenarios.reading.file import SCHEMA, schema
 from fulcrum.sim.model.scene import compose
 from fulcrum.sim.motion.ik import plan_joints
-from fulcrum.sim.plant.mujoco import Plant
+from fulcrum.sim.plant.mujoco import MujocoPlant
 from fulcrum.sim.scenario.scenario import Scenario
 
 
 def scene_xml(scenario: Scenario) -> str:
     """The scene's MJCF, with the start as its keyframe ``start``."""
-    plant = Plant(scenario)
+    plant = MujocoPlant(scenario)
     plant.reset(plan_joints(scenario).start)
     spec = compose(scenario)
     spec.add_key(name="start", qpos=plant.physics.data.qpos)

@@ -62,7 +62,7 @@ class Run(Chosen):
     live: bool = False
     """Open a viewer that follows the run."""
 
-    anyway: bool = False
+    best_effort: bool = False
     """Run with forces as near to balance as the limits allow where none balance the object."""
 
     def execute(self) -> int:
@@ -84,7 +84,7 @@ class Run(Chosen):
         except UnholdableError as error:
             console, controller = Console(highlight=False), self.controller or "robust"
             print_explanation(console, error.explanation, controller)
-            print("Nothing has moved; --anyway shows what happens.")
+            print("Nothing has moved; --best-effort shows what happens.")
             return FAILED
         except PlanError as error:
             print(error)
@@ -99,9 +99,8 @@ class Run(Chosen):
     def _request(self) -> tuple[Request, Preparation | None]:
         """What to run, and what is prepared of it: a planned tilt, if there is to be one."""
         from fulcrum.scenarios.commands.sweep import drawn_world
-        from fulcrum.sim.planning.execution import planned_tilt
         from fulcrum.sim.run.execute import Request
-        from fulcrum.sim.run.preparation import Preparation
+        from fulcrum.sim.run.preparation import prepare
         from fulcrum.sim.scenario.control import default_controller
         from fulcrum.sim.scenario.phases import stretched
         from fulcrum.synthesis.errors import InvalidInputError
@@ -114,20 +113,17 @@ class Run(Chosen):
             controller = self.controller
         control = chosen_control(chosen, controller, self.objective)
         if planning is not None:
-            planned = planned_tilt(chosen, planning)
-            chosen, prepared = planned.scenario, Preparation.of(planned)
+            prepared = prepare(chosen, control, planning=planning)
+            assert prepared.execution is not None
+            chosen = prepared.execution.scenario
         elif self.duration is not None:
             chosen = replace(chosen, phases=stretched(chosen.phases, self.duration))
         if self.seed < 0:
             raise InvalidInputError("--seed", self.seed, "an integer >= 0")
-        if self.anyway:
-            control = replace(control, best_effort=True)
         world = drawn_world(chosen, self.preset, self.seed, self.world)
         out = results_folder(self.out, f"{chosen.name}-{controller}")
-        request = Request(
-            chosen, controller, control, self.seed, out, self.live, self.anyway, world, planning
-        )
-        return request, prepared
+        how = self.seed, out, self.live, self.best_effort
+        return Request(chosen, controller, control, *how, world, planning), prepared
 
 
 def _print_report(report: Report, out: Path) -> None:

@@ -114,7 +114,7 @@ def closed_loop(chosen: Scenario, objective: Objective) -> Loop:
     rows = np.flatnonzero(np.isin(trace.phase, tilting))[::20]
     measured = Sweep(
         tilt_deg=np.degrees(trace.tilt[rows]),
-        normal=history.w_OC_C[rows][..., N],
+        normal=history.w_measured_C[rows][..., N],
         torque=np.abs(trace.tau[rows]).max(axis=1),
         solve_s=trace.synthesis_s[rows],
     )

@@ -50,7 +50,6 @@ def control(table: ControlTable) -> Control:
         preload=table.preload_n,
         objective=table.objective,
         feedforward=table.feedforward,
-        best_effort=table.best_effort,
         solve_every=table.solve_every,
         bandwidth=table.bandwidth_rad_s,
         yielding_squeeze=table.yielding_squeeze,

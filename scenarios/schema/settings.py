@@ -149,9 +149,6 @@ class ControlTable(Table):
     feedforward: bool = True
     """Whether synthesised torques are applied at all."""
 
-    best_effort: bool = False
-    """Whether forces nearest to balance are applied where none balance the object."""
-
     solve_every: Count = Control.solve_every
     """Physics steps per synthesis."""
 

@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 import time
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 from fulcrum.sim.control.drives import Drives
 from fulcrum.sim.control.guard import Supervisor
 from fulcrum.sim.control.health import Health, Sent
 from fulcrum.sim.control.observer import PoseObserver
-from fulcrum.sim.control.replanning import Replanner
 from fulcrum.sim.model.grip import GripSchedule
 from fulcrum.sim.model.inertia import inertial_wrenches
 from fulcrum.sim.model.object_path import object_path
@@ -20,6 +19,7 @@ from fulcrum.sim.motion.joint_path import JointPath
 from fulcrum.sim.motion.references import References
 from fulcrum.sim.scenario.control import Control
 from fulcrum.sim.scenario.scenario import Scenario
+from fulcrum.sim.signals.command import Command
 from fulcrum.sim.signals.event import Event, Mode
 from fulcrum.sim.signals.measurement import Measurement
 from fulcrum.sim.signals.setpoint import Setpoint
@@ -34,82 +34,59 @@ from fulcrum.synthesis import (
     Synthesizer,
     UnboundedError,
 )
-from fulcrum.synthesis.arrays import Array, Mask
+from fulcrum.synthesis.arrays import Array
 from fulcrum.synthesis.best_effort import BestEffort, best_effort
 
 # Time between looks at the run's health [s].
 _CHECK_S = 0.01
 
 
-@dataclass(eq=False, slots=True)  # one every step, and a frozen one takes thrice as long
-class Command:
-    """What the controller asks of the motors, and why.
+class ForceController:
+    """Quasi-static force control along the path; the drives hold the last synthesised forces.
 
-    Attributes:
-        tau: Torques within the limits [N·m or N], (l,).
-        saturated: Which torques were cut at their limit, (l,).
-        phase: Index of the phase.
-        mode: What the run is doing.
-        q_ref: Reference angles [rad or m], (l,).
-        tilt_ref, rate_ref: Reference tilt [rad] and its rate [rad/s].
-        w_OC_C: Commanded wrenches on the object in contact axes [N, N·m], (m, 6).
-        synthesis_s: Wall time of this tick's synthesis [s]; 0 where none was due.
-        failed: Whether this tick's synthesis had no solution, so that the last forces, or with best
-            effort those nearest to balance, are applied.
+    Implements :class:`sim.control.protocol.Controller`; :meth:`reset` comes before all else.
     """
-
-    tau: Array
-    saturated: Mask
-    phase: int
-    mode: Mode
-    q_ref: Array
-    tilt_ref: float
-    rate_ref: float
-    w_OC_C: Array
-    synthesis_s: float
-    failed: bool
-
-
-class Controller:
-    """Quasi-static force control along the path; the drives hold the last synthesised forces."""
 
     def __init__(
         self,
-        scenario: Scenario,
         control: Control,
-        robot: RobotModel,
         joint_path: JointPath,
-        channel: Channel | None = None,
         grip: GripSchedule | None = None,
-        replanner: Replanner | None = None,
+        channel: Channel | None = None,
+        best_effort: bool = False,
     ) -> None:
-        """Takes over what it believes.
+        """Take over what is planned.
 
         Args:
-            scenario: The scene.
             control: The settings.
-            robot: Its model.
             joint_path: What the drives follow.
-            channel: The wire to the drives; an ideal one if left out.
             grip: The least normal forces of the hands; the control's preload if left out.
-            replanner: Plans the rest of a planned tilt anew where need be.
+            channel: The wire to the drives; an ideal one if left out.
+            best_effort: Whether, where no forces balance the object, those nearest to balance are
+                applied, instead of the last that did.
         """
-        self._replanner, self._timestep = replanner, scenario.physics.timestep
-        self._control, schedule = control, joint_path.schedule
+        self._control, self._joint_path, self._grip = control, joint_path, grip
+        self._channel, self._best_effort = channel or Channel(NO_DEVIATION), best_effort
+
+    def reset(self, scenario: Scenario, robot: RobotModel, seed: int) -> None:
+        """See :meth:`Controller.reset`; nothing here is random."""
+        control, joint_path, timestep = self._control, self._joint_path, scenario.physics.timestep
+        schedule = joint_path.schedule
         self._scenario, self._robot, self._path = scenario, robot, object_path(scenario.path)
-        self._references = References(joint_path, self._timestep)
+        self._references = References(joint_path, timestep)
         self._free, self._held = schedule.free.tolist(), schedule.held.tolist()
         # Once the grip has been let go for good there is nothing left to be lowered.
         self._last_held = max(schedule.held.nonzero()[0].tolist(), default=-1)
-        self._statics = Statics(scenario, control, robot, grip)
+        self._statics = Statics(scenario, control, self._grip)
         self._synthesizer = Synthesizer()
         self._drives = Drives(scenario, control, robot)
-        self._channel = channel or Channel(NO_DEVIATION)
         self._observer = PoseObserver(self._path, control.pose_filter_s)
-        self._clock, self._total_s = PathClock(self._timestep), schedule.total_s
+        self._clock, self._total_s = PathClock(timestep), schedule.total_s
         self._supervisor = Supervisor(control.guard)
         self._health = Health(control.guard, scenario, robot, joint_path.start)
-        self._tick, self._check_every = 0, max(1, round(_CHECK_S / self._timestep))
+        self._tick, self._check_every = 0, max(1, round(_CHECK_S / timestep))
+        # The robots as of the last synthesis.
+        self._state = robot.at(joint_path.start)
         # Since when no forces are found, and when a setpoint last arrived, or none was due [s].
         self._failing_t: float | None = None
         self._heard_t = 0.0
@@ -117,18 +94,18 @@ class Controller:
 
     @property
     def events(self) -> tuple[Event, ...]:
-        """What went wrong so far, and what was done about it."""
+        """See :meth:`Controller.events`."""
         return tuple(self._supervisor.events)
 
     def left_s(self, t: float) -> float:
-        """How long the run still takes as things stand at a time [s]; 0 if it has ended."""
+        """See :meth:`Controller.left_s`."""
         supervisor, path_t = self._supervisor, t - self._clock.delay
         if supervisor.mode in (Mode.RUN, Mode.HOLD):
             return self._total_s - path_t
         return supervisor.left_s(t, path_t)
 
     def command(self, measurement: Measurement) -> Command:
-        """The torques for the next step."""
+        """See :meth:`Controller.command`."""
         supervisor, clock, drives = self._supervisor, self._clock, self._drives
         t, seen, mode = measurement.t, self._health.accept(measurement), supervisor.mode
         path_t = clock.at(t, supervisor.rate)
@@ -142,7 +119,8 @@ class Controller:
         if free:
             self._failing_t, self._heard_t = None, t
         if self._tick % self._control.solve_every == 0:
-            drives.update_model(seen.q, target if self._control.inertia else None)
+            self._state = self._robot.at(seen.q)
+            drives.update_model(self._state, target if self._control.inertia else None)
             if not free and self._health.sees_object(seen):
                 started = time.perf_counter()
                 forces = self._synthesize(seen, target)
@@ -166,7 +144,7 @@ class Controller:
             mode=mode,
             tilt_ref=target.tilt,
             rate_ref=target.rate,
-            w_OC_C=drives.w_held,
+            w_commanded_C=drives.w_held,
             synthesis_s=synthesis_s,
             failed=failed,
         )
@@ -186,38 +164,20 @@ class Controller:
         drives = self._drives
         findings = self._health.check(
             seen,
+            self._state,
             target,
             Sent(drives.tau, drives.saturated, drives.tau_pull),
             held=self._held[target.phase],
             failing_s=0.0 if self._failing_t is None else seen.t - self._failing_t,
             silent_s=seen.t - self._heard_t,
         )
-        lowerable, before = target.phase <= self._last_held, self._supervisor.mode
+        lowerable = target.phase <= self._last_held
         self._supervisor.update(seen.t, findings, path_t, lowerable)
-        if self._replanner is not None and target.phase == self._replanner.phase:
-            self._replan(self._replanner, before, seen, target)
-
-    def _replan(
-        self, replanner: Replanner, before: Mode, seen: Measurement, target: Target
-    ) -> None:
-        """Follows the rest of a planned tilt in another timing, where that is due."""
-        anew = None
-        if self._supervisor.mode is Mode.RUN and before is Mode.HOLD:
-            anew, why = replanner.rested(target), "the run goes on"
-        elif self._supervisor.mode is Mode.RUN:
-            anew, why = replanner.caught(target, seen), "the arms have fallen behind"
-        if anew is None:
-            return
-        self._references = References(anew.joint_path, self._timestep)
-        self._total_s = anew.joint_path.schedule.total_s
-        self._clock.set(seen.t, anew.path_t)
-        self._drives.forget(anew.path_t)
-        self._supervisor.note(seen.t, why, "plan anew")
 
     def _synthesize(self, seen: Measurement, target: Target) -> Solution | BestEffort | None:
         """Sends the forces for a measured pose, if there are any."""
         pose = self._observer.update(seen.t, seen.p_WO, seen.quat_WO, target.tilt)
-        problem = self._statics.problem(*pose, target.tilt)
+        problem = self._statics.problem(self._state, *pose, target.tilt)
         if self._control.inertia:
             problem = self._moving(problem, target)
         forces = self._solve(problem)
@@ -240,7 +200,7 @@ class Controller:
         try:
             return self._synthesizer.solve(problem)
         except (InfeasibleError, UnboundedError, SolverError):
-            if not self._control.best_effort:
+            if not self._best_effort:
                 return None
         try:
             return best_effort(problem)

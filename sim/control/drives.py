@@ -24,12 +24,12 @@ along their normals (Khatib 1987, the operational space formulation).
 from __future__ import annotations
 
 import math
-from bisect import bisect_left, bisect_right
+from bisect import bisect_right
 
 import numpy as np
 
 from fulcrum.sim.control.reaction import GripReaction
-from fulcrum.sim.model.robot import RobotModel
+from fulcrum.sim.model.robot import RobotModel, RobotState
 from fulcrum.sim.scenario.control import Control
 from fulcrum.sim.scenario.scenario import Scenario
 from fulcrum.sim.signals.measurement import Measurement
@@ -51,7 +51,7 @@ class Drives:
     """
 
     def __init__(self, scenario: Scenario, control: Control, robot: RobotModel) -> None:
-        """Takes over the model of the robot, which whoever updates it shares."""
+        """Take over the belief."""
         self._robot, self._control = robot, control
         joints = len(robot.joints)
         self.tau_g, self.tau_pull, self.tau = np.zeros((3, joints))
@@ -59,7 +59,11 @@ class Drives:
         contacts, hands = len(scenario.contact_names), len(scenario.hands)
         none = np.zeros(joints), np.zeros((contacts, 6)), np.zeros((hands, 6, joints))
         self._setpoint = Setpoint(*none)
-        self._share, self._tau_held, self.w_held = math.nan, self.tau_g, self._setpoint.w_OC_C
+        self._share, self._tau_held, self.w_held = (
+            math.nan,
+            self.tau_g,
+            self._setpoint.w_commanded_C,
+        )
         # Deviations of angles and speeds, and torques per each of them: both terms in one product.
         self._deviations, self._gains = np.zeros(2 * joints), np.zeros((joints, 2 * joints))
         self._q_off, self._qd_off = self._deviations[:joints], self._deviations[joints:]
@@ -69,15 +73,14 @@ class Drives:
         self._times: list[float] = []
         self._memory: list[Setpoint] = []
 
-    def update_model(self, q: Array, target: Target | None = None) -> None:
-        """Takes over joint angles [rad or m], (l,), for gravity and gains until the next update.
+    def update_model(self, robot: RobotState, target: Target | None = None) -> None:
+        """Take over a state of the robots, for gravity and gains until the next update.
 
         Args:
-            q: The angles.
+            robot: The state.
             target: Whose motion is to be made, inertia and all; None where it does not count.
         """
-        self._robot.update(q)
-        omega, mass_matrix = self._control.bandwidth, self._robot.mass_matrix()
+        omega, mass_matrix = self._control.bandwidth, robot.mass_matrix()
         share, pull, dt = self._share, self.tau_pull, self._update_s
         self._extra = self._reaction.update(
             mass_matrix, self._setpoint, pull, self.tau_g, share, dt
@@ -85,16 +88,17 @@ class Drives:
         if self._control.yielding_squeeze:
             mass_matrix = self._without_squeeze(mass_matrix)
         stiffness, damping = self._reaction.braced(mass_matrix, omega)
-        self._gains[:, : len(q)], self._gains[:, len(q) :] = stiffness, damping
-        self.tau_g = self._robot.gravity()
+        joints = len(stiffness)
+        self._gains[:, :joints], self._gains[:, joints:] = stiffness, damping
+        self.tau_g = robot.tau_g
         if target is not None and target.qdd is not None:
-            self.tau_g = self.tau_g + self._robot.motion_torques(target.qd, target.qdd)
+            self.tau_g = self.tau_g + robot.motion_torques(target.qd, target.qdd)
         self._share = math.nan  # what was held is to be found anew
 
     def _without_squeeze(self, mass_matrix: Array) -> Array:
         """The mass matrix less its part along the squeeze that is asked for."""
         J_n = self._setpoint.J_C[:, N]
-        f_n = self._setpoint.w_OC_C[: len(J_n), N]
+        f_n = self._setpoint.w_commanded_C[: len(J_n), N]
         squeeze = float(np.linalg.norm(f_n))
         if self._share == 0.0 or squeeze == 0.0:
             return mass_matrix
@@ -111,11 +115,6 @@ class Drives:
         """Keeps the present setpoint as that of a path time [s] after all that are kept."""
         self._times.append(path_t)
         self._memory.append(self._setpoint)
-
-    def forget(self, path_t: float) -> None:
-        """Drops what is kept of path times [s] from this one on."""
-        kept = bisect_left(self._times, path_t)
-        del self._times[kept:], self._memory[kept:]
 
     def recall(self, path_t: float) -> None:
         """Takes over the setpoint that held at a path time [s], if any is kept."""
@@ -158,7 +157,7 @@ class Drives:
         """Finds what holds robot and object until the next setpoint or change of share."""
         self._share = share
         self._tau_held = self.tau_g + share * self._setpoint.tau_f
-        self.w_held = share * self._setpoint.w_OC_C
+        self.w_held = share * self._setpoint.w_commanded_C
         if self._extra > 0.0:
             squeeze = share * self._extra * self._reaction.direction
             self._tau_held += squeeze @ self._setpoint.J_C[:, N]

@@ -107,10 +107,6 @@ class Supervisor:
         else:
             self._lower(t, found, path_t)
 
-    def note(self, t: float, text: str, reaction: str) -> None:
-        """Adds what was done by somebody else to the events."""
-        self.events.append(Event(t, text, reaction))
-
     def _hold(self, t: float, text: str) -> None:
         self._enter(Mode.HOLD, t, text)
         self._held_from = self._last_trouble = t

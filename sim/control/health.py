@@ -5,11 +5,11 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
-import mujoco
 import numpy as np
 
+from fulcrum.sim.geometry import quaternion
 from fulcrum.sim.model.object_path import object_path
-from fulcrum.sim.model.robot import RobotModel
+from fulcrum.sim.model.robot import RobotModel, RobotState
 from fulcrum.sim.scenario.control import Guard
 from fulcrum.sim.scenario.scenario import Scenario
 from fulcrum.sim.signals.event import Cause, Finding
@@ -82,8 +82,9 @@ class Health:
         q, qd = measurement.q, measurement.qd
         if not q.dot(q) + qd.dot(qd) < _PLAUSIBLE**2:
             self._lost = lost = ~((np.abs(q) < _PLAUSIBLE) & (np.abs(qd) < _PLAUSIBLE))
-            measurement.q = np.where(lost, self._q, q)
-            measurement.qd = np.where(lost, 0.0, qd)
+            measurement = measurement._replace(
+                q=np.where(lost, self._q, q), qd=np.where(lost, 0.0, qd)
+            )
             self.dead = lost if self.dead is None else self.dead | lost
         elif self._lost is not None:
             self._lost = self.dead = None
@@ -97,6 +98,7 @@ class Health:
     def check(
         self,
         measurement: Measurement,
+        robot: RobotState,
         target: Target,
         sent: Sent,
         held: bool,
@@ -107,6 +109,7 @@ class Health:
 
         Args:
             measurement: An accepted measurement.
+            robot: The robots as of the last synthesis.
             target: The references.
             sent: What the drives last asked for.
             held: Whether the object is held with full grip.
@@ -116,7 +119,7 @@ class Health:
         settings, t = self._settings, measurement.t
         found = self._encoders(measurement, target)
         found += self._motors(t, measurement.tau, sent.tau)
-        found += self._object(measurement, target, held)
+        found += self._object(measurement, robot, target, held)
         if failing_s > settings.no_forces_s:
             found.append(Finding(Cause.FORCES, "the synthesis finds no forces"))
         elif silent_s > settings.silence_s and failing_s == 0.0 and self.sees_object(measurement):
@@ -185,7 +188,9 @@ class Health:
         )
         return [Finding(Cause.MOTOR, text)]
 
-    def _object(self, measurement: Measurement, target: Target, held: bool) -> list[Finding]:
+    def _object(
+        self, measurement: Measurement, robot: RobotState, target: Target, held: bool
+    ) -> list[Finding]:
         """Whether the object is seen, is where the hands are, and has the tilt it should have."""
         t, settings = measurement.t, self._settings
         pose = measurement.p_WO.tobytes() + measurement.quat_WO.tobytes()
@@ -206,7 +211,7 @@ class Health:
         self._tilt_error += share * (error - self._tilt_error)
         if not held:
             return []
-        off = self._off_hands(measurement)
+        off = self._off_hands(measurement, robot)
         worst = int(off.argmax())
         found = []
         if self._lasts(Cause.OBJECT, t, off[worst] > settings.contact_error) > _LASTING_S:
@@ -217,11 +222,10 @@ class Health:
             found.append(Finding(Cause.TILT, f"the tilt is {error_deg:.1f} deg off"))
         return found
 
-    def _off_hands(self, measurement: Measurement) -> Array:
+    def _off_hands(self, measurement: Measurement, robot: RobotState) -> Array:
         """Distances of the tips from where the object as seen would have them [m], (n,)."""
-        R_WO = np.empty((3, 3))
-        mujoco.mju_quat2Mat(R_WO.reshape(9), measurement.quat_WO)
-        off = self._p_OT_O.dot(R_WO.T) + measurement.p_WO - self._robot.tips()
+        R_WO = quaternion.matrix(measurement.quat_WO)
+        off = self._p_OT_O.dot(R_WO.T) + measurement.p_WO - robot.tips()
         return np.sqrt(np.einsum("ni,ni->n", off, off))
 
 

@@ -9,9 +9,9 @@ from __future__ import annotations
 
 import math
 
-import mujoco
 import numpy as np
 
+from fulcrum.sim.geometry import quaternion
 from fulcrum.sim.model.object_path import ObjectPath
 from fulcrum.synthesis.arrays import Array
 
@@ -24,7 +24,6 @@ class PoseObserver:
         self._path, self._tau = path, time_constant
         self._t, self._tilt = math.nan, 0.0
         self._p_WO, self._quat_WO = np.zeros(3), np.zeros(4)
-        self._rotvec = np.zeros(3)
 
     def update(self, t: float, p_WO: Array, quat_WO: Array, tilt_ref: float) -> tuple[Array, Array]:
         """The estimate of position, (3,), and orientation, (4,).
@@ -45,11 +44,8 @@ class PoseObserver:
                 self._tilt, tilt_ref, self._p_WO, self._quat_WO
             )
             self._p_WO = self._p_WO + share * (p_WO - self._p_WO)
-            self._correct(quat_WO, share)
+            # In the object's axes.
+            turn = quaternion.difference(quat_WO, self._quat_WO)
+            self._quat_WO = quaternion.turned(self._quat_WO, turn, share)
         self._t, self._tilt = t, tilt_ref
         return self._p_WO, self._quat_WO
-
-    def _correct(self, quat_WO: Array, share: float) -> None:
-        """Turns the estimate a share of the way to a measured orientation."""
-        mujoco.mju_subQuat(self._rotvec, quat_WO, self._quat_WO)  # in the object's axes
-        mujoco.mju_quatIntegrate(self._quat_WO, self._rotvec, share)

@@ -78,7 +78,7 @@ class GripReaction:
                 what they make is their own affair.
             dt: Time since the last update [s].
         """
-        if self._most == 0.0 or not share >= 1.0 or not setpoint.w_OC_C.any():
+        if self._most == 0.0 or not share >= 1.0 or not setpoint.w_commanded_C.any():
             self._extra = 0.0
             return 0.0
         hands = len(self.direction)
@@ -88,7 +88,7 @@ class GripReaction:
         # Hands that share joints cannot make all wrenches: a trace of damping picks the smallest.
         compliance.flat[:: 6 * hands + 1] *= 1.0 + _SINGULAR
         f_p = np.linalg.solve(compliance, weighted.T @ pull).reshape(hands, 6)
-        w_C = share * setpoint.w_OC_C[:hands] + f_p
+        w_C = share * setpoint.w_commanded_C[:hands] + f_p
         need = np.linalg.norm(w_C * self._needs, axis=1) - w_C[:, N]
         wanted = float((need / self.direction).max())
         eased = self._extra * math.exp(-dt / _EASE_S)

@@ -160,7 +160,7 @@ class Judge:
                     f"(allowed {100 * limits.utilisation:.0f} %), first at {{when}}."
                 )
                 failures.append(_failure(trace, used, text))
-            peak = float(np.abs(trace.w_command_C[:, i, N]).max())
+            peak = float(np.abs(trace.w_commanded_C[:, i, N]).max())
             allowed_n = limits.force_error * peak
             if peak > 0.0 and not lost.any() and contact.force_error_rms_n > allowed_n:
                 text = (
@@ -183,7 +183,7 @@ class Judge:
             return []
         measured, commanded = (
             np.einsum("kmij,kmj->ki", history.R_WC[here], wrenches[here][..., :3])
-            for wrenches in (history.w_OC_C, trace.w_command_C)
+            for wrenches in (history.w_measured_C, trace.w_commanded_C)
         )
         off = _rms(np.linalg.norm(measured - commanded, axis=1))
         allowed = self._scenario.tolerances.force_error * np.linalg.norm(commanded, axis=1).max()
@@ -202,8 +202,8 @@ class Judge:
         last = self._schedule.phases[-1]
         alone = (trace.phase == len(self._schedule.phases) - 1) & (last.gap > 0.0)
         for i, hand in enumerate(self._scenario.hands):
-            normal = history.w_OC_C[:, i, N]
-            peak = float(trace.w_command_C[:, i, N].max())
+            normal = history.w_measured_C[:, i, N]
+            peak = float(trace.w_commanded_C[:, i, N].max())
             impact = free & (normal > peak)
             if impact.any() and peak > 0.0:
                 text = (
@@ -273,12 +273,12 @@ def _failure(trace: Trace, mask: Mask, text: str) -> _Failure:
 def _contact(
     i: int, trace: Trace, history: ContactHistory, held_rows: Mask, free: Mask
 ) -> ContactReport:
-    impact = float(history.w_OC_C[free, i, N].max(initial=0.0))
+    impact = float(history.w_measured_C[free, i, N].max(initial=0.0))
     if not held_rows.any():
         return ContactReport(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, impact)
     kept = history.kept[held_rows, i]
     held = np.logical_and.accumulate(kept)
-    normal = history.w_OC_C[held_rows, i, N]
+    normal = history.w_measured_C[held_rows, i, N]
 
     def largest(quantity: Array) -> float:
         return float(quantity[held_rows, i][held].max(initial=0.0))
@@ -290,7 +290,7 @@ def _contact(
         spin_deg=float(np.degrees(largest(np.abs(history.spin)))),
         max_utilisation=largest(history.utilisation),
         max_normal_n=float(normal.max()),
-        force_error_rms_n=_rms(normal - trace.w_command_C[held_rows, i, N]),
+        force_error_rms_n=_rms(normal - trace.w_commanded_C[held_rows, i, N]),
         free_normal_n=impact,
     )
 

@@ -20,7 +20,7 @@ class ContactHistory:
 
     Attributes:
         R_WC: Contact axes in the world, (k, m, 3, 3).
-        w_OC_C: Measured wrenches on the object in contact axes [N, N·m], (k, m, 6).
+        w_measured_C: Measured wrenches on the object in contact axes [N, N·m], (k, m, 6).
         kept: Whether there was a normal force, (k, m).
         slip: Tangential drift of the material points that touched when grip was built up [m], (k,
             m); 0 while not held.
@@ -30,7 +30,7 @@ class ContactHistory:
     """
 
     R_WC: Array
-    w_OC_C: Array
+    w_measured_C: Array
     kept: Mask
     slip: Array
     slide: Array
@@ -64,21 +64,21 @@ class Monitor:
         """Contact quantities of the next rows of the run."""
         R_WO = rotations(block.quat_WO)
         R_WC = self._frames.in_world(R_WO)
-        w_OC_C = np.zeros((len(block), len(self._contacts), 6))
-        w_OC_C[..., :3] = np.einsum("kmji,kmj->kmi", R_WC, block.f_W[..., :3])
-        w_OC_C[..., M_N] = block.f_W[..., 3]
+        w_measured_C = np.zeros((len(block), len(self._contacts), 6))
+        w_measured_C[..., :3] = np.einsum("kmji,kmj->kmi", R_WC, block.f_W[..., :3])
+        w_measured_C[..., M_N] = block.f_W[..., 3]
         held = self._held[block.phase.astype(int)]
         normal = R_WC[..., :, N]
         slip = self._slips(block, R_WO, normal, held)
         slide, spin = self._integrals(block, normal, held)
         return ContactHistory(
             R_WC=R_WC,
-            w_OC_C=w_OC_C,
-            kept=w_OC_C[..., N] > 0.0,
+            w_measured_C=w_measured_C,
+            kept=w_measured_C[..., N] > 0.0,
             slip=slip,
             slide=slide,
             spin=spin,
-            utilisation=utilisation(self._contacts, w_OC_C),
+            utilisation=utilisation(self._contacts, w_measured_C),
         )
 
     def _slips(self, block: Trace, R_WO: Array, normal: Array, held: Mask) -> Array:

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 
-import mujoco
 import numpy as np
 from scipy.interpolate import CubicSpline
 from scipy.spatial.transform import Rotation, RotationSpline
 
+from fulcrum.sim.geometry import quaternion
 from fulcrum.sim.scenario.path import Pivot, Poses
 from fulcrum.sim.scenario.scenario import Scenario
 from fulcrum.synthesis import InvalidInputError
@@ -59,7 +59,7 @@ class ObjectPath(ABC):
         """Its derivative by the tilt [1/rad], (3,)."""
 
     @abstractmethod
-    def tilt(self, quaternion: Array) -> Array:
+    def tilt(self, quat_WO: Array) -> Array:
         """Tilt [rad] of measured orientations, (..., 4) wxyz."""
 
     @abstractmethod
@@ -143,27 +143,25 @@ class ScrewPath(ObjectPath):
         """See :meth:`ObjectPath.axis_slope`: zero."""
         return _NO_SLOPE
 
-    def tilt(self, quaternion: Array) -> Array:
+    def tilt(self, quat_WO: Array) -> Array:
         """Tilt [rad] of measured orientations, (..., 4) wxyz: their twist about the axis.
 
         The twist is the part of the rotation from the start that is about the axis, in
         [-pi, pi); what is left, the swing, does not count as tilt.
         """
         # Sums, not a product of matrices, whose rounding depends on how many rows there are.
-        cosine, sine = ((quaternion * row).sum(axis=-1) for row in self._half_tilt)
+        cosine, sine = ((quat_WO * row).sum(axis=-1) for row in self._half_tilt)
         return np.mod(2.0 * np.arctan2(sine, cosine) + np.pi, 2.0 * np.pi) - np.pi
 
     def carry(
         self, before: float, after: float, p_WO: Array, quat_WO: Array
     ) -> tuple[Array, Array]:
         """See :meth:`ObjectPath.carry`."""
-        turn, quaternion, arm = np.empty(4), np.empty(4), np.empty(3)
-        mujoco.mju_axisAngle2Quat(turn, self.direction, after - before)
-        mujoco.mju_mulQuat(quaternion, turn, quat_WO)
+        turn = quaternion.about(self.direction, after - before)
         # The axis travels with the object.
         point = self.point + before * self.advance
-        mujoco.mju_rotVecQuat(arm, p_WO - point, turn)
-        return self.point + after * self.advance + arm, quaternion
+        arm = quaternion.rotated(turn, p_WO - point)
+        return self.point + after * self.advance + arm, quaternion.product(turn, quat_WO)
 
 
 class PosesPath(ObjectPath):
@@ -250,12 +248,12 @@ class PosesPath(ObjectPath):
         """See :meth:`ObjectPath.axis_slope`."""
         return self._turn(tilt)[2]
 
-    def tilt(self, quaternion: Array) -> Array:
+    def tilt(self, quat_WO: Array) -> Array:
         """Tilt [rad] of measured orientations, (..., 4) wxyz: the nearest point of the path.
 
         Beyond the ends it goes on with the turn about the axis there.
         """
-        q = np.reshape(quaternion, (-1, 4))
+        q = np.reshape(quat_WO, (-1, 4))
         measured = Rotation.from_quat(q, scalar_first=True)
         # Sums, not a product of matrices, whose rounding depends on how many rows there are.
         near = np.abs((q[:, None] * self._quats).sum(axis=-1)).argmax(axis=1)
@@ -267,20 +265,17 @@ class PosesPath(ObjectPath):
             # What is missing, in the object's axes there, as the rate is.
             missing = (there.inv() * measured).as_rotvec()
             tilt = tilt + (missing * rate).sum(axis=1) / (rate * rate).sum(axis=1)
-        return tilt.reshape(np.shape(quaternion)[:-1])
+        return tilt.reshape(np.shape(quat_WO)[:-1])
 
     def carry(
         self, before: float, after: float, p_WO: Array, quat_WO: Array
     ) -> tuple[Array, Array]:
         """See :meth:`ObjectPath.carry`."""
         start, stop = self._table((before, after))
-        back, turn, quaternion, arm = np.empty((4, 4))
-        mujoco.mju_negQuat(back, start[:4])
-        mujoco.mju_mulQuat(turn, stop[:4], back)
-        mujoco.mju_normalize4(turn)
-        mujoco.mju_mulQuat(quaternion, turn, quat_WO)
-        mujoco.mju_rotVecQuat(arm[:3], p_WO - start[4:], turn)
-        return stop[4:] + arm[:3], quaternion
+        turn = quaternion.product(stop[:4], quaternion.inverse(start[:4]))
+        turn = quaternion.normalized(turn)
+        arm = quaternion.rotated(turn, p_WO - start[4:])
+        return stop[4:] + arm, quaternion.product(turn, quat_WO)
 
 
 def check_supports(scenario: Scenario) -> None:

@@ -46,22 +46,19 @@ class RobotModel:
         self.start_deviation = np.array([scenario.start_deviation[name] for name in self.joints])
 
         self._model = pinocchio_model(scene)
-        # The second, for motion, leaves the first as of the last update.
-        self._data, self._moving = self._model.createData(), self._model.createData()
         # Pinocchio may order joints otherwise; every vector here is in the order of the motors.
-        self._order = np.array(
-            [self._model.joints[self._model.getJointId(name)].idx_v for name in self.joints]
-        )
+        order = [self._model.joints[self._model.getJointId(name)].idx_v for name in self.joints]
+        self._order = np.array(order)
         # Where in Pinocchio's mass matrix, of which only the upper triangle counts, ours is.
-        first = np.minimum.outer(self._order, self._order)
-        second = np.maximum.outer(self._order, self._order)
+        first, second = np.minimum.outer(order, order), np.maximum.outer(order, order)
         self._mass_entries = first * self._model.nv + second
-        self._q = np.zeros(self._model.nq)
-        self._tau_g = np.zeros(len(self.joints))
         tips = [self._frame(tip_site(hand)) for hand in scenario.hands]
         self._tip_joints = [int(self._model.frames[tip].parentJoint) for tip in tips]
         self._tip_places = [self._model.frames[tip].placement.translation.copy() for tip in tips]
         self.tip_radii = np.array([scene.geom(tip_geom(h)).size[0] for h in scenario.hands])
+        # Pinocchio's work space for motion, and those of states that nobody holds any more.
+        self._moving = self._model.createData()
+        self._spare: list[pin.Data] = []
 
     def _frame(self, name: str) -> int:
         if not self._model.existFrame(name):
@@ -69,28 +66,47 @@ class RobotModel:
             raise ValueError(f"frame: got {name!r}; valid is one of {frames}.")
         return int(self._model.getFrameId(name))
 
-    def update(self, q: Array) -> None:
-        """Takes over joint angles [rad or m], (l,), for all quantities asked for next."""
-        self._q[self._order] = q
-        pin.computeJointJacobians(self._model, self._data, self._q)
-        g = pin.computeGeneralizedGravity(self._model, self._data, self._q)
-        self._tau_g = g.take(self._order)
+    def at(self, q: Array) -> RobotState:
+        """Return the robots at joint angles [rad or m], (l,)."""
+        return RobotState(self, q)
 
-    def gravity(self) -> Array:
-        """Torque that holds the robot up against gravity [N·m or N], (l,)."""
-        return self._tau_g
+
+class RobotState:
+    """The robots at one posture; nothing about it changes later.
+
+    Attributes:
+        robot: Whose state it is.
+        tau_g: Torque that holds the robots up against gravity [N·m or N], (l,).
+    """
+
+    __slots__ = ("_data", "_q", "robot", "tau_g")
+
+    def __init__(self, robot: RobotModel, q: Array) -> None:
+        self.robot = robot
+        model, order = robot._model, robot._order
+        # A new work space of Pinocchio takes longer than all that is computed in it.
+        self._data = robot._spare.pop() if robot._spare else model.createData()
+        self._q = np.zeros(model.nq)
+        self._q[order] = q
+        pin.computeJointJacobians(model, self._data, self._q)
+        g = pin.computeGeneralizedGravity(model, self._data, self._q)
+        self.tau_g = g.take(order)
+
+    def __del__(self) -> None:
+        self.robot._spare.append(self._data)
 
     def tips(self) -> Array:
-        """Centres of the hands' tips in the world [m], (n, 3), at the last updated angles."""
-        places = zip(self._tip_joints, self._tip_places, strict=True)
+        """Return the centres of the hands' tips in the world [m], (n, 3)."""
+        places = zip(self.robot._tip_joints, self.robot._tip_places, strict=True)
         return np.array([self._data.oMi[joint].act(place) for joint, place in places])
 
     def mass_matrix(self) -> Array:
-        """Joint-space inertia [kg m^2 or kg], (l, l)."""
-        return pin.crba(self._model, self._data, self._q).take(self._mass_entries)
+        """Return the joint-space inertia [kg m^2 or kg], (l, l)."""
+        robot = self.robot
+        return pin.crba(robot._model, self._data, self._q).take(robot._mass_entries)
 
     def inertial_torques(self, slope: Array, curvature: Array) -> tuple[Array, Array]:
-        r"""What motion along joint angles q(s) costs, at the last updated angles.
+        r"""Return what motion along joint angles q(s) costs.
 
         Args:
             slope: q' [rad or m], (l,).
@@ -100,19 +116,19 @@ class RobotModel:
             :math:`M q'` and :math:`M q'' + C(q, q') q'`, (l,) each: torques per :math:`\ddot s` and
             per :math:`\dot s^2`, without viscous friction.
         """
-        return self.motion_torques(np.zeros_like(slope), slope), self.motion_torques(
-            slope, curvature
-        )
+        at_rest = np.zeros_like(slope)
+        return self.motion_torques(at_rest, slope), self.motion_torques(slope, curvature)
 
     def motion_torques(self, qd: Array, qdd: Array) -> Array:
-        r""":math:`M \ddot q + C(q, \dot q) \dot q` [N·m or N], (l,), at the last updated angles."""
-        speeds, accelerations = np.zeros((2, self._model.nv))
-        speeds[self._order], accelerations[self._order] = qd, qdd
-        tau = pin.rnea(self._model, self._moving, self._q, speeds, accelerations)
-        return tau.take(self._order) - self._tau_g
+        r"""Return :math:`M \ddot q + C(q, \dot q) \dot q` [N·m or N], (l,)."""
+        robot = self.robot
+        speeds, accelerations = np.zeros((2, robot._model.nv))
+        speeds[robot._order], accelerations[robot._order] = qd, qdd
+        tau = pin.rnea(robot._model, robot._moving, self._q, speeds, accelerations)
+        return tau.take(robot._order) - self.tau_g
 
     def contact_jacobians(self, p_WC: Array, R_WC: Array) -> Array:
-        """Jacobians of the hands' points at the contacts, in contact axes.
+        """Return the Jacobians of the hands' points at the contacts, in contact axes.
 
         Args:
             p_WC: Contact points in the world [m], (n, 3).
@@ -121,22 +137,24 @@ class RobotModel:
         Returns:
             (n, 6, l): twist, linear part first, of the point of each hand that is at its contact.
         """
-        J_C = np.empty((len(self._tip_joints), 6, len(self.joints)))
-        for i, joint in enumerate(self._tip_joints):
+        robot, data = self.robot, self._data
+        J_C = np.empty((len(robot._tip_joints), 6, len(robot.joints)))
+        for i, joint in enumerate(robot._tip_joints):
             # The contact as a frame that the tip's joint carries along.
-            X_JC = self._data.oMi[joint].actInv(pin.SE3(R_WC[i], p_WC[i]))
-            J = pin.getFrameJacobian(self._model, self._data, joint, X_JC, pin.ReferenceFrame.LOCAL)
-            J.take(self._order, axis=1, out=J_C[i], mode="clip")
+            X_JC = data.oMi[joint].actInv(pin.SE3(R_WC[i], p_WC[i]))
+            J = pin.getFrameJacobian(robot._model, data, joint, X_JC, pin.ReferenceFrame.LOCAL)
+            J.take(robot._order, axis=1, out=J_C[i], mode="clip")
         return J_C
 
     def statics(self, p_WC: Array, R_WC: Array) -> Joints:
-        """The joints' part of the synthesis problem at the last updated angles."""
+        """Return the joints' part of the synthesis problem, (15) and (16), at these contacts."""
+        robot = self.robot
         return Joints(
-            names=self.joints,
+            names=robot.joints,
             J_C=self.contact_jacobians(p_WC, R_WC),
-            tau_g=self.gravity(),
-            tau_min=self.tau_min,
-            tau_max=self.tau_max,
+            tau_g=self.tau_g,
+            tau_min=robot.tau_min,
+            tau_max=robot.tau_max,
         )
 
 

@@ -22,6 +22,7 @@ from fulcrum.sim.scenario.contacts import Friction, Hand
 from fulcrum.sim.scenario.robot import Robot
 from fulcrum.sim.scenario.scenario import Scenario
 from fulcrum.synthesis import InvalidInputError
+from fulcrum.synthesis.arrays import Array
 
 # Solver tolerance of both the main and the noslip solver; tight, for runs are compared bit by bit.
 _SOLVER_TOLERANCE = 1e-10
@@ -112,6 +113,20 @@ def joint_ranges(scene: mujoco.MjModel) -> NDArray[np.float64]:
     """(njnt, 2) lower and upper limits of a scene's joints [rad or m]; infinite without limits."""
     limited = scene.jnt_limited[:, None].astype(bool)
     return np.where(limited, scene.jnt_range, [-np.inf, np.inf])
+
+
+def object_bounds(scenario: Scenario, scene: mujoco.MjModel) -> tuple[Array, Array]:
+    """Return opposite corners of the bounds of the object's geoms, in the object frame [m]."""
+    corners = []
+    for name in (geom.name for geom in scenario.object.geoms):
+        geom = scene.geom(name)
+        center, half = scene.geom_aabb[geom.id].reshape(2, 3)
+        R = np.zeros(9)
+        mujoco.mju_quat2Mat(R, geom.quat)
+        signs = np.array(np.meshgrid(*[(-1.0, 1.0)] * 3)).reshape(3, -1).T
+        corners.append(geom.pos + (center + signs * half) @ R.reshape(3, 3).T)
+    points = np.concatenate(corners)
+    return points.min(axis=0), points.max(axis=0)
 
 
 def _set_options(spec: mujoco.MjSpec, scenario: Scenario) -> None:

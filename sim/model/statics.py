@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import mujoco
 import numpy as np
 
+from fulcrum.sim.geometry import quaternion
 from fulcrum.sim.geometry.object import GRAVITY, Object
 from fulcrum.sim.model.contacts import ContactFrames, contacts
 from fulcrum.sim.model.grip import GripSchedule, pressed
-from fulcrum.sim.model.robot import RobotModel
+from fulcrum.sim.model.robot import RobotState
 from fulcrum.sim.scenario.control import Control
 from fulcrum.sim.scenario.scenario import Scenario
 from fulcrum.synthesis import Problem
@@ -27,7 +27,6 @@ class Statics:
         self,
         scenario: Scenario,
         control: Control,
-        robot: RobotModel | None,
         grip: GripSchedule | None = None,
     ) -> None:
         """Takes over the nominal scenario.
@@ -35,10 +34,8 @@ class Statics:
         Args:
             scenario: The scene.
             control: What the synthesis is told.
-            robot: Without one the problems have no joints.
             grip: The least normal forces of the hands; the control's preload if left out.
         """
-        self._robot = robot
         self._objective = control.objective
         nominal, end = contacts(scenario, control), np.radians(scenario.path.angle_deg)
         self._contacts = [nominal]
@@ -53,17 +50,19 @@ class Statics:
         # Stacked over the moment about the object frame: the wrench of a force at the centre.
         self._at_center = np.vstack([np.eye(3), skew(center_O)])
 
-    def problem(self, p_WO: Array, quat_WO: Array, tilt: float = 0.0) -> Problem:
-        """The problem at the angles that the robot was last updated to.
+    def problem(
+        self, robot: RobotState | None, p_WO: Array, quat_WO: Array, tilt: float = 0.0
+    ) -> Problem:
+        """Return the problem at a state.
 
         Args:
+            robot: The robots at their joint angles; without them the problem has no joints.
             p_WO: Position of the object [m], (3,).
             quat_WO: Its orientation, (4,), wxyz.
             tilt: Where it should be on the path [rad]: what the least grip depends on.
         """
         row = round(min(max(tilt * self._rows_per_rad, 0.0), len(self._contacts) - 1.0))
-        R_WO = np.empty((3, 3))
-        mujoco.mju_quat2Mat(R_WO.reshape(9), quat_WO)
+        R_WO = quaternion.matrix(quat_WO)
         R_OC = self._frames.in_object(R_WO)
         p_WC = self._frames.points(R_WO, p_WO)
         n = self._hands
@@ -72,7 +71,7 @@ class Statics:
             R_OC=R_OC,
             p_OC_O=self._frames.p_OC_O,
             w_ext_O=self._at_center.dot(R_WO.T.dot(self._weight_W)),
-            joints=None if self._robot is None else self._robot.statics(p_WC[:n], R_WO @ R_OC[:n]),
+            joints=None if robot is None else robot.statics(p_WC[:n], R_WO @ R_OC[:n]),
             objective=self._objective,
         )
 

@@ -36,7 +36,3 @@ class PathClock:
         else:
             self.change = 0.0
         return t - self.delay
-
-    def set(self, t: float, path_t: float) -> None:
-        """Brings path time to a value [s] at a time of the plant [s], from where it runs on."""
-        self.delay, self.rate, self.change = t - path_t, 1.0, 0.0

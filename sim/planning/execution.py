@@ -22,6 +22,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from fulcrum.sim.model.grip import GripSchedule
+from fulcrum.sim.model.robot import RobotModel
 from fulcrum.sim.motion.ik import plan_joints
 from fulcrum.sim.motion.joint_path import JointPath
 from fulcrum.sim.motion.schedule import Schedule
@@ -96,13 +97,10 @@ class Execution:
     joint_path: JointPath
     grip: GripSchedule
 
-    @property
-    def phase(self) -> int:
-        """Index of the phase that tilts."""
-        return _whole_tilt(self.scenario.phases)
 
-
-def planned_tilt(scenario: Scenario, planning: Planning) -> Execution:
+def planned_tilt(
+    scenario: Scenario, planning: Planning, robot: RobotModel | None = None
+) -> Execution:
     """Plans the tilt of a scenario, and puts the plan into its manoeuvre.
 
     Raises:
@@ -112,7 +110,7 @@ def planned_tilt(scenario: Scenario, planning: Planning) -> Execution:
     """
     # Whatever timing the scenario has, planned ones included, the plan is the same.
     slow = replace(scenario, phases=stretched(scenario.phases, _SLOW_S))
-    planned = made_plan(slow, own_margins(scenario.control), planning)
+    planned = made_plan(slow, own_margins(scenario.control), planning, robot)
     found = planned.solution
     squared = np.maximum(found.b, 0.0)
     timing = Timing(tuple(found.problem.s.tolist()), tuple(squared.tolist()))
@@ -135,7 +133,9 @@ def planned_tilt(scenario: Scenario, planning: Planning) -> Execution:
     return Execution(fast, planning, planned, joint_path, _grip(planned))
 
 
-def made_plan(scenario: Scenario, margins: Margins, planning: Planning) -> Plan:
+def made_plan(
+    scenario: Scenario, margins: Margins, planning: Planning, robot: RobotModel | None = None
+) -> Plan:
     """The plan of a scenario's tilt, as it is asked for.
 
     Raises:
@@ -152,6 +152,7 @@ def made_plan(scenario: Scenario, margins: Margins, planning: Planning) -> Plan:
         planning.duration,
         planning.points,
         planning.stretch,
+        robot,
     )
 
 

@@ -34,6 +34,7 @@ class PathProblems:
         with_joints: bool = True,
         joint_path: JointPath | None = None,
         grip: GripSchedule | None = None,
+        robot: RobotModel | None = None,
     ) -> None:
         """Plans the joint path, if need be.
 
@@ -43,6 +44,7 @@ class PathProblems:
             with_joints: Whether the arms are part of the problem: (15) and (16).
             joint_path: The scenario's, where it is planned already.
             grip: The least normal forces of the hands; the control's preload if left out.
+            robot: The scenario's, where it is built already.
 
         Raises:
             PathError: The arms cannot follow the path.
@@ -50,9 +52,9 @@ class PathProblems:
         self.scenario = scenario
         self._path = object_path(scenario.path)
         self.end_deg = float(np.degrees(self._path.end))
-        self._robot = RobotModel(scenario) if with_joints else None
+        self._robot = (robot or RobotModel(scenario)) if with_joints else None
         self.joint_path = joint_path or plan_joints(scenario) if with_joints else None
-        self._statics = Statics(scenario, control, self._robot, grip)
+        self._statics = Statics(scenario, control, grip)
 
     def tilts(self, step_deg: float) -> Array:
         """Evenly spaced tilts from start to end, at most a step apart [deg]."""
@@ -65,11 +67,12 @@ class PathProblems:
             InvalidInputError: The tilt is not on the path.
         """
         tilt = self._tilt(tilt_deg)
+        state = None
         if self._robot is not None and self.joint_path is not None:
-            self._robot.update(self.joint_path.holding(tilt))
+            state = self._robot.at(self.joint_path.holding(tilt))
         R_WO, p_WO = self._path.pose(tilt)
         quat_WO = Rotation.from_matrix(R_WO).as_quat(scalar_first=True)
-        return self._statics.problem(p_WO, quat_WO, tilt)
+        return self._statics.problem(state, p_WO, quat_WO, tilt)
 
     def gravity(self, tilt_deg: float) -> Gravity:
         """The object's weight at a tilt [deg]."""

@@ -10,6 +10,7 @@ from typing import NamedTuple
 import numpy as np
 from scipy.interpolate import BSpline, make_interp_spline
 
+from fulcrum.sim.model.robot import RobotModel
 from fulcrum.sim.planning.problem import CERTAIN, Margins, path_problem
 from fulcrum.sim.scenario.scenario import Scenario
 from fulcrum.synthesis import FulcrumError, InvalidInputError
@@ -238,9 +239,7 @@ def plan(
     duration: float = math.inf,
     points: int = 100,
     uncertainty: UncertaintySet = CERTAIN,
-    start: float = 0.0,
-    start_rate: float = 0.0,
-    curve: BSpline | None = None,
+    robot: RobotModel | None = None,
 ) -> Plan:
     """Plans the tilt of a scenario.
 
@@ -251,9 +250,7 @@ def plan(
         duration: The longest that the tilt may take [s].
         points: Grid points, at least 3.
         uncertainty: What the plan is to serve with one timing and one grip.
-        start: Share of the tilt at which it begins, below 1 [-].
-        start_rate: At which rate of that share [1/s].
-        curve: Joint angles over the share of the tilt, where they are known already.
+        robot: The scenario's, where it is built already.
 
     Raises:
         InvalidInputError: An argument is senseless.
@@ -262,10 +259,8 @@ def plan(
     """
     if points < 3:
         raise InvalidInputError("points", points, "an integer >= 3")
-    if not 0.0 <= start < 1.0:
-        raise InvalidInputError("start", start, "a share in [0, 1)")
-    problem, curve, joints = path_problem(scenario, margins, points, uncertainty, start, curve)
-    problem = replace(problem, objective=objective, duration=duration, start_rate=start_rate)
+    problem, curve, joints = path_problem(scenario, margins, points, uncertainty, robot)
+    problem = replace(problem, objective=objective, duration=duration)
     what = "every tilt" if math.isinf(duration) else f"every tilt in at most {duration:g} s"
     return Plan(scenario, margins, joints, _solve(scenario, problem, what), curve)
 

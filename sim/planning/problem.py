@@ -81,8 +81,7 @@ def path_problem(
     margins: Margins,
     points: int,
     uncertainty: UncertaintySet = CERTAIN,
-    start: float = 0.0,
-    curve: BSpline | None = None,
+    robot: RobotModel | None = None,
 ) -> tuple[PathProblem, BSpline, tuple[str, ...]]:
     """The path problem of a scenario's tilt, the joint angles over its share, and the joints.
 
@@ -93,31 +92,29 @@ def path_problem(
         uncertainty: By how much the world may differ from the scenario with its true friction:
             one timing and one grip serve all of the set, and the scenario itself with the margins'
             friction factor, which is the first load.
-        start: Share of the tilt at which the path begins [-].
-        curve: The joint angles, where they are known already.
+        robot: The scenario's, where it is built already.
 
     Raises:
         PathError: The arms cannot follow the path.
     """
-    robot, path = RobotModel(scenario), object_path(scenario.path)
+    robot, path = robot or RobotModel(scenario), object_path(scenario.path)
     gripped = _gripped(scenario, margins.grip_max)
     control = Control(friction_factor=margins.friction_factor, preload=margins.grip_min)
-    believed = Statics(gripped, control, robot)
+    believed = Statics(gripped, control)
     true = contacts(gripped, replace(control, friction_factor=1.0))
     corners = [] if uncertainty == CERTAIN else _corners(scenario.object, uncertainty)
     placed: tuple[Problem, ...] = ()
-    if curve is None:
-        curve = tilting_curve(plan_joints(scenario, _SOLVED))
-    s = np.linspace(start, 1.0, points)
+    curve = tilting_curve(plan_joints(scenario, _SOLVED))
+    s = np.linspace(0.0, 1.0, points)
     q, slope, curvature = curve(s), curve(s, 1), curve(s, 2)
     problems: list[list[Problem]] = []
     torques = np.empty((2, *q.shape))
     for k in range(points):
-        robot.update(q[k])
-        torques[:, k] = robot.inertial_torques(slope[k], curvature[k])
+        state = robot.at(q[k])
+        torques[:, k] = state.inertial_torques(slope[k], curvature[k])
         R_WO, p_WO = path.pose(path.end * s[k])
         quaternion = Rotation.from_matrix(R_WO).as_quat(scalar_first=True)
-        at_rest = believed.problem(p_WO, quaternion, path.end * s[k])
+        at_rest = believed.problem(state, p_WO, quaternion, path.end * s[k])
         problems.append([_within(at_rest, margins.limits)])
         if corners:
             placed = uncertainty.placed(replace(problems[k][0], contacts=true))

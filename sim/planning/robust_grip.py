@@ -12,6 +12,7 @@ from dataclasses import replace
 import numpy as np
 
 from fulcrum.sim.model.grip import GripSchedule, pressed
+from fulcrum.sim.model.robot import RobotModel
 from fulcrum.sim.motion.joint_path import JointPath
 from fulcrum.sim.planning.path_problems import PathProblems
 from fulcrum.sim.scenario.control import Control
@@ -29,7 +30,11 @@ _HALVINGS = 4
 
 
 def plan_grip(
-    scenario: Scenario, control: Control, joint_path: JointPath | None = None
+    scenario: Scenario,
+    control: Control,
+    joint_path: JointPath | None = None,
+    robot: RobotModel | None = None,
+    best_effort: bool = False,
 ) -> GripSchedule | None:
     """The least grip that gives the control its robustness; None if it asks for none.
 
@@ -37,19 +42,21 @@ def plan_grip(
         scenario: The scene as it is believed.
         control: The controller.
         joint_path: The scenario's, where it is planned already.
+        robot: The scenario's, where it is built already.
+        best_effort: Whether the control's preload alone does where no forces hold the object.
 
     Raises:
         PathError: The arms cannot follow the path.
-        RobustInfeasibleError: At a tilt no forces hold even the nominal object, and the control
-            does not ask for the best effort.
+        RobustInfeasibleError: At a tilt no forces hold even the nominal object, without
+            `best_effort`.
         SolverError: The solver gave neither forces nor a proof.
     """
     if control.robustness is None:
         return None
-    problems = _true_problems(scenario, control, joint_path)
+    problems = _true_problems(scenario, control, joint_path, robot)
     tilts_deg = problems.tilts(_STEP_DEG)
     found = [
-        _grip(problems.problem(tilt), problems.gravity(tilt), control)
+        _grip(problems.problem(tilt), problems.gravity(tilt), control, best_effort)
         for tilt in tilts_deg.tolist()
     ]
     return GripSchedule(
@@ -85,15 +92,20 @@ def borne(
 
 
 def _true_problems(
-    scenario: Scenario, control: Control, joint_path: JointPath | None
+    scenario: Scenario,
+    control: Control,
+    joint_path: JointPath | None,
+    robot: RobotModel | None = None,
 ) -> PathProblems:
     """The problems with the believed friction in full: the set says how much less it may be."""
     # The norm makes the forces of unequal hands unique.
     full = replace(control, friction_factor=1.0, objective=Objective.NORM_NORMAL_FORCE)
-    return PathProblems(scenario, full, joint_path=joint_path)
+    return PathProblems(scenario, full, joint_path=joint_path, robot=robot)
 
 
-def _grip(problem: Problem, gravity: Gravity, control: Control) -> tuple[Array, float]:
+def _grip(
+    problem: Problem, gravity: Gravity, control: Control, best_effort: bool
+) -> tuple[Array, float]:
     """Normal forces of the hands [N], (n,), and the share of the robustness that they give."""
     assert control.robustness is not None
     robustness = control.robustness
@@ -112,7 +124,7 @@ def _grip(problem: Problem, gravity: Gravity, control: Control) -> tuple[Array, 
     try:
         f_n = serving(share)
     except RobustInfeasibleError:
-        if not control.best_effort:
+        if not best_effort:
             raise
         return np.full(len(problem.hands), control.preload), share
     for step in 0.5 ** np.arange(1, _HALVINGS + 1):

@@ -7,6 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from fulcrum.sim.model.robot import RobotModel
 from fulcrum.sim.planning.plan import Plan, PlanError, plan
 from fulcrum.sim.planning.problem import CERTAIN, Margins
 from fulcrum.sim.scenario.scenario import Scenario
@@ -25,6 +26,7 @@ def robust_plan(
     duration: float = math.inf,
     points: int = 100,
     stretch: float = 1.0,
+    robot: RobotModel | None = None,
 ) -> Plan:
     """The plan that serves the largest share of a set, itself and the scenario's own margins.
 
@@ -36,15 +38,18 @@ def robust_plan(
         duration: The longest that the tilt may take before it is stretched [s].
         points: Grid points.
         stretch: By how much the duration is stretched then.
+        robot: The scenario's, where it is built already.
 
     Raises:
         PathError: The arms cannot follow the path.
         PlanError: No timing keeps all limits, even if all is as believed.
     """
 
+    robot = robot or RobotModel(scenario)
+
     def serving(share: float, points: int) -> Plan:
         served = uncertainty.scaled(share) if share > 0.0 else CERTAIN
-        found = plan(scenario, margins, objective, duration, points, served)
+        found = plan(scenario, margins, objective, duration, points, served, robot)
         if stretch != 1.0:
             found = found.stretched(stretch)
         return replace(found, share=share)

@@ -8,6 +8,7 @@ from scipy.spatial.transform import Rotation
 
 from fulcrum.sim.model.scene import tip_site
 from fulcrum.sim.scenario.scenario import Scenario
+from fulcrum.sim.signals.trace import Trace
 from fulcrum.synthesis.arrays import Array
 
 # Steps that there is room for at first.
@@ -38,41 +39,41 @@ class MotionLog:
         for name, views in columns.items():
             start, end = end, end + sum(map(len, views))
             self._columns[name] = slice(start, end)
+        self.clear()
 
-    def append(self, step: int) -> None:
-        """Keeps what belongs to the step that was just made, the one of an index in a block."""
-        if step >= len(self._rows):
+    def clear(self) -> None:
+        """Forget all steps."""
+        self._steps = 0
+
+    def append(self) -> None:
+        """Keep what belongs to the step that was just made."""
+        if self._steps == len(self._rows):
             self._rows = np.concatenate([self._rows, np.zeros_like(self._rows)])
-        np.concatenate(self._views, out=self._rows[step])
+        np.concatenate(self._views, out=self._rows[self._steps])
+        self._steps += 1
 
-    def _read(self, name: str, steps: int, width: int) -> Array:
-        """What was kept of the first s steps, (s, k, w)."""
-        return self._rows[:steps, self._columns[name]].reshape(steps, -1, width)
-
-    def tips(self, positions: Array, quaternions: Array, twists: Array) -> None:
-        """Writes the hands' tip poses and world twists (linear first) of the first s steps.
+    def read(self, block: Trace) -> None:
+        """Write tip poses and world twists (linear first) of the logged steps; forget those.
 
         Args:
-            positions: Written with (s, n, 3) [m].
-            quaternions: Written with (s, n, 4), wxyz.
-            twists: Written with (s, n, 6).
+            block: One row per logged step.
         """
-        steps = len(positions)
-        positions[:] = self._read("tip", steps, 3)
+        block.p_WE[:] = self._read("tip", 3)
         # Rotations to rounding, for MuJoCo makes them of unit quaternions.
-        axes = self._read("axes", steps, 9).reshape(-1, 3, 3)
+        axes = self._read("axes", 9).reshape(-1, 3, 3)
         flat = Rotation.from_matrix(axes, assume_valid=True).as_quat(scalar_first=True)
-        quaternions[:] = flat.reshape(quaternions.shape)
-        twists[:] = self._twists(slice(0, -1), positions)
+        block.quat_WE[:] = flat.reshape(block.quat_WE.shape)
+        block.twist_WE[:] = self._twists(slice(0, -1), block.p_WE)
+        block.twist_WO[:] = self._twists(slice(-1, None), self._read("place", 3))[:, 0]
+        self.clear()
 
-    def object_twist(self, twists: Array) -> None:
-        """Writes the world twist of the object frame, linear part first, of s steps, (s, 6)."""
-        places = self._read("place", len(twists), 3)
-        twists[:] = self._twists(slice(-1, None), places)[:, 0]
+    def _read(self, name: str, width: int) -> Array:
+        """What was kept of the s steps, (s, k, w)."""
+        return self._rows[: self._steps, self._columns[name]].reshape(self._steps, -1, width)
 
     def _twists(self, bodies: slice, points: Array) -> Array:
         """World twists, (s, b, 6), of bodies' points that are at places in the world, (s, b, 3)."""
-        velocity = self._read("velocity", len(points), 6)[:, bodies]
-        lever = points - self._read("center", len(points), 3)[:, bodies]
+        velocity = self._read("velocity", 6)[:, bodies]
+        lever = points - self._read("center", 3)[:, bodies]
         turn = velocity[..., _ANGULAR]
         return np.concatenate([velocity[..., _LINEAR] + np.cross(turn, lever), turn], axis=-1)

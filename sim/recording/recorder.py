@@ -143,7 +143,7 @@ class Recorder:
         turning = np.einsum("ki,ki->k", block.twist_WO[:, 3:], axis)
         rate = np.column_stack([block.rate_ref, turning])
         self._send("tilt_rate", time, np.degrees(rate))
-        normal = np.column_stack([block.w_command_C[..., N], history.w_OC_C[..., N]])
+        normal = np.column_stack([block.w_commanded_C[..., N], history.w_measured_C[..., N]])
         self._send("normal_force", time, normal)
         self._send("utilisation", time, np.where(history.kept, history.utilisation, 0.0))
         self._send("slip", time, 1e3 * history.slip)
@@ -198,7 +198,7 @@ class Recorder:
         time = rr.TimeColumn(TIMELINE, duration=rows.t)
         self._scenery.send_poses(self._recording, rows)
         R_WC = history.R_WC[picked]
-        commanded = np.einsum("kmij,kmj->kmi", R_WC, rows.w_command_C[..., :3])
+        commanded = np.einsum("kmij,kmj->kmi", R_WC, rows.w_commanded_C[..., :3])
         for kind, forces in (("measured", rows.f_W[..., :3]), ("commanded", commanded)):
             columns = arrows(rows.p_WC, _METERS_PER_NEWTON * forces)
             self._recording.send_columns(f"forces/{kind}", [time], columns)

@@ -13,8 +13,9 @@ from fulcrum.sim.model.object_path import object_path
 from fulcrum.sim.model.robot import RobotModel
 from fulcrum.sim.motion.ik import plan_joints
 from fulcrum.sim.motion.schedule import Schedule
-from fulcrum.sim.plant.mujoco import Plant
+from fulcrum.sim.plant.mujoco import MujocoPlant
 from fulcrum.sim.scenario.scenario import Scenario
+from fulcrum.sim.signals.trace import Trace
 from fulcrum.synthesis import InvalidInputError
 from fulcrum.synthesis.arrays import Array
 from fulcrum.synthesis.checks import positive
@@ -36,29 +37,35 @@ class TiltTask(control.Task):
     those after it. The reward is the share of the path's tilt that is reached, from 0 to 1.
     """
 
-    def __init__(self, scenario: Scenario, plant: Plant, seed: int) -> None:
+    def __init__(self, scenario: Scenario, plant: MujocoPlant, seed: int) -> None:
         self._plant = plant
         self._path = object_path(scenario.path)
         self._robot = RobotModel(scenario)
         self._start = plan_joints(scenario).start
         self._deviation = self._robot.start_deviation
         self._random = np.random.default_rng(seed)
-        self._p_WC = np.zeros((len(scenario.contact_names), 3))
-        self._f_W = np.zeros((len(scenario.contact_names), 4))
+        self._object = scenario.object.name
+        # What happened in the last physics step.
+        hands, contacts = len(scenario.hands), len(scenario.contact_names)
+        self._last = Trace.allocate(1, len(self._robot.joints), hands, contacts)
 
     def initialize_episode(self, physics: Any) -> None:
         """Puts robot and object at their start, the joints with small random deviations."""
         deviation = self._deviation * self._random.normal(size=len(self._start))
         self._plant.place(self._start + deviation)
-        self._f_W[:] = 0.0
+        self._last.f_W[:] = self._last.twist_WO[:] = 0.0
 
     def before_step(self, action: Array, physics: Any) -> None:
         """Applies the torques."""
         self._plant.apply(np.asarray(action))
 
     def after_step(self, physics: Any) -> None:
-        """Reads the contact forces of the step."""
-        self._plant.contacts(self._p_WC, self._f_W)
+        """Reads what happened in the last physics step, from the state before it."""
+        thing = physics.named.data
+        self._last.p_WO[:] = thing.xpos[self._object]
+        self._last.quat_WO[:] = thing.xquat[self._object]
+        self._plant.log()
+        self._plant.contacts(self._last)
 
     def action_spec(self, physics: Any) -> specs.BoundedArray:
         """Joint torques within their limits."""
@@ -70,14 +77,12 @@ class TiltTask(control.Task):
     def get_observation(self, physics: Any) -> OrderedDict[str, Array]:
         """The observations by name."""
         measurement = self._plant.measure()
-        twist = np.zeros(6)
-        self._plant.object_twist(twist)
         return OrderedDict(
             joint_positions=measurement.q,
             joint_velocities=measurement.qd,
             object_pose=np.concatenate([measurement.p_WO, measurement.quat_WO]),
-            object_twist=twist,
-            contact_forces=self._f_W.copy(),
+            object_twist=self._last.twist_WO[0].copy(),
+            contact_forces=self._last.f_W[0].copy(),
         )
 
     def get_reward(self, physics: Any) -> float:
@@ -107,7 +112,7 @@ def make_environment(
     if abs(steps - round(steps)) > _WHOLE or round(steps) < 1:
         valid = f"a multiple of the physics' {scenario.physics.timestep:g} s"
         raise InvalidInputError("control_timestep", control_timestep, valid)
-    plant = Plant(scenario)
+    plant = MujocoPlant(scenario)
     return control.Environment(
         plant.physics,
         TiltTask(scenario, plant, seed),

@@ -14,14 +14,14 @@ from pathlib import Path
 from types import FrameType
 from typing import Any
 
-from fulcrum.sim.control.replanning import Replanner
 from fulcrum.sim.evaluation.judge import Judge
 from fulcrum.sim.evaluation.monitor import ContactHistory, Monitor
 from fulcrum.sim.evaluation.report import Report, RunInfo
 from fulcrum.sim.planning.execution import Planning
+from fulcrum.sim.plant.protocol import DivergedError
 from fulcrum.sim.recording import Recorder, open_viewer
+from fulcrum.sim.run.assembly import closed_loop
 from fulcrum.sim.run.files import check_new_folder, finite, write_json
-from fulcrum.sim.run.loop import ClosedLoop, DivergedError
 from fulcrum.sim.run.notebook import report_markdown
 from fulcrum.sim.run.preparation import Preparation, prepare
 from fulcrum.sim.scenario.control import Control, controller, default_controller
@@ -47,7 +47,8 @@ class Request:
         seed: Draws the small deviations of the start posture.
         out: Folder for recording, configuration and report; None writes nothing.
         live: Whether to open a viewer that follows the run (with ``out`` only).
-        anyway: Whether to run although the synthesis finds no forces somewhere on the path.
+        best_effort: Whether to run although the synthesis finds no forces somewhere on the path:
+            with those nearest to balance there.
         world: What is true of the plant beyond the scenario; nothing else by default.
         planning: How the tilt is planned; None for the scenario's own timing.
     """
@@ -58,7 +59,7 @@ class Request:
     seed: int = 0
     out: Path | None = None
     live: bool = False
-    anyway: bool = False
+    best_effort: bool = False
     world: World = NO_DEVIATION
     planning: Planning | None = None
 
@@ -111,7 +112,7 @@ def execute(
         PathError: The arms cannot follow the path; nothing has moved.
         InvalidInputError: The scenario contradicts itself, or the folder holds something.
         UnholdableError: The synthesis finds no forces somewhere on the path, and the request does
-            not say to run anyway.
+            not ask for the best effort.
         PlanError: The planned tilt breaks a limit.
         DivergedError: The simulation diverged in its first step.
     """
@@ -119,24 +120,22 @@ def execute(
     if out is not None:
         check_new_folder("out", out)
     if prepared is None:
-        check, planning = not request.anyway, request.planning
-        prepared = prepare(request.scenario, control, check, planning=planning)
-    execution, replanner = prepared.execution, None
-    if execution is not None:
-        request = dataclasses.replace(request, scenario=execution.scenario)
-        replanner = Replanner(execution) if control.inertia else None
-    loop = ClosedLoop(
+        prepared = prepare(
+            request.scenario, control, request.best_effort, planning=request.planning
+        )
+    if prepared.execution is not None:
+        request = dataclasses.replace(request, scenario=prepared.execution.scenario)
+    loop = closed_loop(
         request.scenario,
         control,
+        prepared,
+        request.world,
         seed=request.seed,
-        joint_path=prepared.joint_path,
-        world=request.world,
-        grip=prepared.grip,
-        replanner=replanner,
+        best_effort=request.best_effort,
     )
-    monitor = Monitor(loop.truth)
-    robot = loop.robot
-    judge = Judge(loop.truth, robot.joints, robot.tau_min, robot.tau_max)
+    truth, robot = loop.truth, loop.robot
+    monitor = Monitor(truth)
+    judge = Judge(truth, robot.joints, robot.tau_min, robot.tau_max)
     recorder = None
     histories: list[ContactHistory] = []
     error: str | None = None
@@ -150,11 +149,11 @@ def execute(
             limits = robot.tau_min, robot.tau_max
             recorder = Recorder(
                 out / RECORDING,
-                loop.truth,
+                truth,
                 config,
                 robot.joints,
                 *limits,
-                plan=None if execution is None else execution.plan,
+                plan=None if prepared.execution is None else prepared.execution.plan,
                 viewer_url=viewer_url,
             )
         started = time.perf_counter()
@@ -179,8 +178,8 @@ def execute(
             interrupted=stop.requested,
             error=error,
             recording=None if out is None else RECORDING,
-            collisions=loop.collisions,
-            events=loop.events,
+            collisions=loop.plant.collisions,
+            events=loop.controller.events,
         )
         history = ContactHistory.concatenate(histories)
         trace = loop.trace

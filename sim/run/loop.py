@@ -5,93 +5,71 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 import numpy as np
-from dm_control.rl.control import PhysicsError
 
-from fulcrum.sim.control.controller import Controller
-from fulcrum.sim.control.replanning import Replanner
+from fulcrum.sim.control.protocol import Controller
 from fulcrum.sim.model.contacts import ContactFrames
-from fulcrum.sim.model.grip import GripSchedule
 from fulcrum.sim.model.object_path import object_path
 from fulcrum.sim.model.robot import RobotModel
-from fulcrum.sim.motion.ik import plan_joints
-from fulcrum.sim.motion.joint_path import JointPath
-from fulcrum.sim.planning.robust_grip import plan_grip
-from fulcrum.sim.plant.mujoco import Plant
-from fulcrum.sim.scenario.control import Control
+from fulcrum.sim.plant.protocol import DivergedError, Plant
 from fulcrum.sim.scenario.scenario import Scenario
-from fulcrum.sim.signals.event import Event
 from fulcrum.sim.signals.measurement import Measurement
 from fulcrum.sim.signals.trace import Trace
-from fulcrum.sim.world.channel import Channel
+from fulcrum.sim.world.motors import Motors
+from fulcrum.sim.world.pushes import Pushes
 from fulcrum.sim.world.sensors import Sensors
-from fulcrum.sim.world.world import NO_DEVIATION, World
-from fulcrum.synthesis import FulcrumError
+from fulcrum.sim.world.world import World
+from fulcrum.synthesis.arrays import Array
 
 # Time per block that is handed on while the loop runs [s]; what an abrupt end may lose.
 _BLOCK_S = 0.25
-
-
-class DivergedError(FulcrumError):
-    """The simulation's state has left what numbers can hold."""
-
-    def __init__(self, t: float) -> None:
-        super().__init__(f"the simulation diverged at {t:.3f} s; check the scenario's physics.")
 
 
 class ClosedLoop:
     """One run of a scenario.
 
     Attributes:
+        robot: The controller's model of the robots.
         truth: What the plant is.
-        robot: The controller's belief about the robot.
+        plant: What is controlled.
+        controller: What controls it.
         steps: How many steps have been made.
     """
 
     def __init__(
         self,
         scenario: Scenario,
-        control: Control,
-        truth: Scenario | None = None,
+        robot: RobotModel,
+        truth: Scenario,
+        plant: Plant,
+        controller: Controller,
+        world: World,
+        start: Array,
         seed: int = 0,
-        joint_path: JointPath | None = None,
-        world: World = NO_DEVIATION,
-        grip: GripSchedule | None = None,
-        replanner: Replanner | None = None,
     ) -> None:
-        """Plans the joint path, if need be, and sets up plant and controller.
+        """Put plant and controller at the start.
 
         Args:
             scenario: What the controller believes.
-            control: The controller.
-            truth: What the plant is but for the world; the scenario if left out.
-            seed: Draws the deviations of the start posture.
-            joint_path: The scenario's, where it is planned already.
-            world: How the plant deviates from that, and what disturbs it; nothing by default.
-            grip: What the control's robustness asks for, where it is planned already.
-            replanner: Plans the rest of a planned tilt anew where need be.
+            robot: Its model of the robots.
+            truth: What the plant is.
+            plant: What is controlled.
+            controller: What controls it.
+            world: What disturbs sensors, motors and object.
+            start: Joint angles at the start [rad or m], (l,), but for small deviations.
+            seed: Draws the deviations of the start posture, and what is random in the controller.
 
         Raises:
             InvalidInputError: The world does not fit the scenario.
-            PathError: The arms cannot follow the path.
-            RobustInfeasibleError: No grip holds even the nominal object somewhere on the path.
             DivergedError: The start's state is more than numbers can hold.
         """
+        self.robot, self.truth, self.plant, self.controller = robot, truth, plant, controller
         self._path = object_path(scenario.path)
-        self.robot = robot = RobotModel(scenario)
-        joint_path = joint_path or plan_joints(scenario)
-        self.truth = world.truth(truth or scenario)
-        grip = grip or plan_grip(scenario, control, joint_path)
-        self._controller = Controller(
-            scenario, control, robot, joint_path, Channel(world), grip, replanner
-        )
-        self._plant = Plant(self.truth, world)
-        self._sensors = Sensors(world, self._plant.joints)
+        self._sensors, self._pushes = Sensors(world, plant.joints), Pushes(world)
+        self._motors = Motors(world, robot.tau_max, plant.joints)
         deviation = np.random.default_rng(seed).normal(size=len(robot.joints))
-        try:
-            self._plant.reset(joint_path.start + robot.start_deviation * deviation)
-        except PhysicsError as error:
-            raise DivergedError(0.0) from error
-        self._dt = dt = self.truth.physics.timestep
+        plant.reset(start + robot.start_deviation * deviation)
+        controller.reset(scenario, robot, seed)
+        self._dt = dt = scenario.physics.timestep
         self.steps = 0
         self._block = max(1, round(_BLOCK_S / dt))
         self._trace = Trace.allocate(
@@ -107,20 +85,10 @@ class ClosedLoop:
     @property
     def total_steps(self) -> int:
         """How many steps the run takes as things stand."""
-        return self.steps + max(0, round(self._controller.left_s(self.steps * self._dt) / self._dt))
-
-    @property
-    def events(self) -> tuple[Event, ...]:
-        """What went wrong so far, and what was done about it."""
-        return self._controller.events
-
-    @property
-    def collisions(self) -> dict[tuple[str, str], float]:
-        """Pairs of geoms that touched against the scenario's will, and when first [s]."""
-        return self._plant.collisions
+        return self.steps + max(0, round(self.controller.left_s(self.steps * self._dt) / self._dt))
 
     def run(self) -> Iterator[Trace]:
-        """Steps to the end, handing over each block of rows as soon as it is full.
+        """Step to the end, handing over each block of rows as soon as it is full.
 
         Raises:
             DivergedError: The simulation has diverged; the rows before it have been handed over.
@@ -130,11 +98,11 @@ class ClosedLoop:
             stop = min(start + self._block, self.total_steps)
             if stop > len(self._trace):
                 self._trace = self._trace.grown(len(self._trace))
-            diverged: PhysicsError | None = None
+            diverged: DivergedError | None = None
             for row in range(start, stop):
                 try:
-                    self._step(row, row - start)
-                except PhysicsError as error:
+                    self._step(row)
+                except DivergedError as error:
                     diverged = error
                     break
                 self.steps = row + 1
@@ -143,12 +111,12 @@ class ClosedLoop:
                 self._complete(block)
                 yield block
             if diverged is not None:
-                raise DivergedError(float(self._trace.t[self.steps])) from diverged
+                raise diverged
 
     def _complete(self, block: Trace) -> None:
-        """Fills the columns that are worked out for a whole block at once."""
+        """Fill the columns that are worked out for a whole block at once."""
         block.tilt[:] = self._path.tilt(block.quat_WO)
-        self._plant.read(block)
+        self.plant.contacts(block)
         # Where there is no contact its last place counts.
         steps, contacts = np.arange(len(block)), np.arange(block.p_WC.shape[1])
         touched = ~np.isnan(block.p_WC[..., 0])
@@ -157,23 +125,22 @@ class ClosedLoop:
         block.p_WC[:] = block.p_WC[last, contacts]
         self._p_WC = block.p_WC[-1]
 
-    def _step(self, row: int, step: int) -> None:
-        trace, plant = self._trace, self._plant
-        measurement = plant.measure()
-        self._write_state(row, measurement)
-        command = self._controller.command(self._sensors.see(measurement))
-        plant.apply(command.tau)
+    def _step(self, row: int) -> None:
+        trace, plant = self._trace, self.plant
+        truth = plant.measure()
+        self._write_state(row, truth)
+        command = self.controller.command(self._sensors.see(truth))
+        plant.apply(self._motors.torques(truth.t, command.tau), self._pushes.at(truth.t))
         plant.step()
         trace.phase[row], trace.mode[row] = command.phase, command.mode
         trace.q_ref[row], trace.tilt_ref[row] = command.q_ref, command.tilt_ref
         trace.rate_ref[row] = command.rate_ref
         trace.tau[row], trace.saturated[row] = command.tau, command.saturated
-        trace.w_command_C[row] = command.w_OC_C
+        trace.w_commanded_C[row] = command.w_commanded_C
         trace.synthesis_s[row], trace.failed[row] = command.synthesis_s, command.failed
-        plant.log(step)
 
-    def _write_state(self, row: int, measurement: Measurement) -> None:
+    def _write_state(self, row: int, truth: Measurement) -> None:
         trace = self._trace
-        trace.t[row] = measurement.t
-        trace.q[row], trace.qd[row] = measurement.q, measurement.qd
-        trace.p_WO[row], trace.quat_WO[row] = measurement.p_WO, measurement.quat_WO
+        trace.t[row] = truth.t
+        trace.q[row], trace.qd[row] = truth.q, truth.qd
+        trace.p_WO[row], trace.quat_WO[row] = truth.p_WO, truth.quat_WO

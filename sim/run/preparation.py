@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 from fulcrum.sim.analysis.explain import Explanation, explain
 from fulcrum.sim.model.grip import GripSchedule
+from fulcrum.sim.model.robot import RobotModel
 from fulcrum.sim.motion.ik import plan_joints
 from fulcrum.sim.motion.joint_path import JointPath
 from fulcrum.sim.planning.execution import Execution, Planning, planned_tilt
@@ -41,50 +42,55 @@ class Preparation:
     """What depends on belief and controller alone, so that runs can share it.
 
     Attributes:
+        robot: The controller's model of the robots.
         joint_path: How the arms follow the object's path.
         grip: The least grip over the tilt; None for the control's preload alone.
         execution: The planned tilt, with the scenario that it makes; None if it is not planned.
     """
 
+    robot: RobotModel
     joint_path: JointPath
     grip: GripSchedule | None
     execution: Execution | None = None
-
-    @staticmethod
-    def of(execution: Execution) -> Preparation:
-        """That of a planned tilt."""
-        return Preparation(execution.joint_path, execution.grip, execution)
 
 
 def prepare(
     scenario: Scenario,
     control: Control,
-    check: bool = True,
+    best_effort: bool = False,
     joint_path: JointPath | None = None,
     planning: Planning | None = None,
+    robot: RobotModel | None = None,
+    check: bool = True,
 ) -> Preparation:
     """Plans a run.
 
     Args:
         scenario: What the controller believes.
         control: The controller.
-        check: Whether to refuse what a certificate proves infeasible at one of the path's tilts.
+        best_effort: Whether to go on where a certificate proves that no forces exist at one of the
+            path's tilts.
         joint_path: The scenario's, where it is planned already.
         planning: How the tilt is planned; None for the scenario's own timing.
+        robot: The scenario's, where it is built already.
+        check: Whether to look for tilts without forces, where there is no best effort.
 
     Raises:
         PathError: The arms cannot follow the path.
         PlanError: The planned tilt breaks a limit.
         UnholdableError: Somewhere on it no forces hold the object.
     """
+    robot = robot or RobotModel(scenario)
     if planning is not None:
-        return Preparation.of(planned_tilt(scenario, planning))
+        planned = planned_tilt(scenario, planning, robot)
+        return Preparation(robot, planned.joint_path, planned.grip, planned)
     joint_path = joint_path or plan_joints(scenario)
     if not control.feedforward:
-        return Preparation(joint_path, None)
-    if check:
-        _check(PathProblems(scenario, control, joint_path=joint_path))
-    return Preparation(joint_path, plan_grip(scenario, control, joint_path))
+        return Preparation(robot, joint_path, None)
+    if check and not best_effort:
+        _check(PathProblems(scenario, control, joint_path=joint_path, robot=robot))
+    grip = plan_grip(scenario, control, joint_path, robot, best_effort)
+    return Preparation(robot, joint_path, grip)
 
 
 def _check(problems: PathProblems) -> None:

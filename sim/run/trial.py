@@ -65,7 +65,7 @@ def confirm(
     """
     thing, weight = scenario.object, share * capacity
     heavy = thing.weighing(weight / (thing.mass * GRAVITY))
-    request = Request(replace(scenario, object=heavy), controller, control, anyway=True)
+    request = Request(replace(scenario, object=heavy), controller, control, best_effort=True)
     report = execute(request, progress).report
     return Trial(
         share=share,

@@ -81,8 +81,6 @@ class Control:
         preload: Lower bound of the hands' normal forces [N].
         objective: What the synthesis minimises.
         feedforward: Whether synthesised torques are applied at all.
-        best_effort: Whether, where no forces balance the object, those nearest to balance are
-            applied, instead of the last that did.
         solve_every: Physics steps per synthesis.
         bandwidth: Natural frequency of the joint impedance, which is critically damped [rad/s].
         yielding_squeeze: Whether the impedance leaves the hands' squeeze to the feed-forward.
@@ -98,7 +96,6 @@ class Control:
     preload: float = 5.0
     objective: Objective = Objective.MAX_NORMAL_FORCE
     feedforward: bool = True
-    best_effort: bool = False
     solve_every: int = 4
     bandwidth: float = 30.0
     yielding_squeeze: bool = False

@@ -82,20 +82,3 @@ class Timing:
         end_rate = np.sqrt(np.maximum(rates[k] ** 2 + 2.0 * accelerations[k] * way, 0.0))
         total = rates[k] + end_rate
         return times[k] + np.divide(2.0 * way, total, out=np.zeros_like(total), where=total > 0.0)
-
-    def continued(self, progress: Array, squared_rates: Array) -> Timing:
-        """This timing up to where another one begins, and that one from there to the end.
-
-        Args:
-            progress: Grid of the other one [-], (k,), from there to 1.
-            squared_rates: At its points [1/s^2], (k,).
-        """
-        _, p, rates, accelerations = self._pieces
-        before = p < progress[0]
-        k = int(np.count_nonzero(before)) - 1
-        there = max(0.0, rates[k] ** 2 + 2.0 * accelerations[k] * (progress[0] - p[k]))
-        squared = np.asarray(self.squared_rates)[before]
-        return Timing(
-            tuple(np.concatenate([p[before], progress[:1], progress]).tolist()),
-            tuple(np.concatenate([squared, [there], squared_rates]).tolist()),
-        )

@@ -44,7 +44,7 @@ class Event:
     Attributes:
         t: Time [s].
         cause: What was found, in words.
-        reaction: hold, run, plan anew, lower, stop or end.
+        reaction: hold, run, lower, stop or end.
     """
 
     t: float

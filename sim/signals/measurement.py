@@ -2,18 +2,13 @@
 
 from __future__ import annotations
 
-import warnings
-from dataclasses import dataclass
+from typing import NamedTuple
 
 from fulcrum.synthesis.arrays import Array
 
-with warnings.catch_warnings():  # dm_control looks for a display on import; none is needed
-    warnings.simplefilter("ignore")
 
-
-@dataclass(eq=False, slots=True)  # one every step, and a frozen one takes thrice as long
-class Measurement:
-    """What the controller gets to know at one instant.
+class Measurement(NamedTuple):
+    """The state of joints and object at one instant, as it is or as sensors give it.
 
     Attributes:
         t: Time [s].

@@ -7,13 +7,13 @@ from dataclasses import dataclass, fields
 import numpy as np
 from numpy.typing import NDArray
 
-from fulcrum.synthesis.arrays import Array
+from fulcrum.synthesis.arrays import Array, Mask
 
 
-def stretches(flags: Array) -> NDArray[np.intp]:
+def stretches(flags: Mask) -> NDArray[np.intp]:
     """How many steps in a row a flag has been set at each step, (k,) of (k,)."""
     steps = np.arange(1, len(flags) + 1)
-    return steps - np.maximum.accumulate(np.where(flags > 0.0, 0, steps))
+    return steps - np.maximum.accumulate(np.where(flags, 0, steps))
 
 
 @dataclass(frozen=True, eq=False)
@@ -35,15 +35,15 @@ class Trace:
         p_WE, quat_WE, twist_WE: Tip poses and twists, (k, n, 3 | 4 | 6).
         p_WC: Where the plant's contacts are, (k, m, 3); the last place where there is none.
         f_W: Force on the object and torsional moment about the normal into it, (k, m, 4).
-        w_command_C: Commanded wrenches on the object in contact axes, (k, m, 6).
+        w_commanded_C: Commanded wrenches on the object in contact axes, (k, m, 6).
         synthesis_s: Wall time of the synthesis; 0 where none was due, (k,).
         failed: Syntheses without solution, (k,).
         collisions: Contacts that the scenario does not want, (k,).
     """
 
     t: Array
-    phase: Array
-    mode: Array
+    phase: NDArray[np.intp]
+    mode: NDArray[np.intp]
     tilt_ref: Array
     rate_ref: Array
     tilt: Array
@@ -54,33 +54,21 @@ class Trace:
     qd: Array
     q_ref: Array
     tau: Array
-    saturated: Array
+    saturated: Mask
     p_WE: Array
     quat_WE: Array
     twist_WE: Array
     p_WC: Array
     f_W: Array
-    w_command_C: Array
+    w_commanded_C: Array
     synthesis_s: Array
-    failed: Array
-    collisions: Array
+    failed: Mask
+    collisions: NDArray[np.intp]
 
     @staticmethod
     def allocate(steps: int, joints: int, hands: int, contacts: int) -> Trace:
-        """An all-zero trace, to be filled row by row."""
-        numbers = [
-            "t",
-            "phase",
-            "mode",
-            "tilt_ref",
-            "rate_ref",
-            "tilt",
-            "synthesis_s",
-            "failed",
-            "collisions",
-        ]
+        """Return an all-zero trace, to be filled row by row."""
         shapes = {
-            **dict.fromkeys(numbers, ()),
             **dict.fromkeys(("q", "qd", "q_ref", "tau", "saturated"), (joints,)),
             "p_WO": (3,),
             "quat_WO": (4,),
@@ -90,15 +78,24 @@ class Trace:
             "twist_WE": (hands, 6),
             "p_WC": (contacts, 3),
             "f_W": (contacts, 4),
-            "w_command_C": (contacts, 6),
+            "w_commanded_C": (contacts, 6),
         }
-        return Trace(**{name: np.zeros((steps, *shape)) for name, shape in shapes.items()})
+        kinds = {
+            **dict.fromkeys(("phase", "mode", "collisions"), np.intp),
+            **dict.fromkeys(("saturated", "failed"), np.bool_),
+        }
+        return Trace(
+            **{
+                f.name: np.zeros((steps, *shapes.get(f.name, ())), kinds.get(f.name, np.float64))
+                for f in fields(Trace)
+            }
+        )
 
     def grown(self, steps: int) -> Trace:
         """A copy with room for so many steps more, all-zero."""
         arrays = {f.name: getattr(self, f.name) for f in fields(self)}
-        room = {n: np.zeros((steps, *array.shape[1:])) for n, array in arrays.items()}
-        return Trace(**{n: np.concatenate([array, room[n]]) for n, array in arrays.items()})
+        room = {n: np.zeros((steps, *a.shape[1:]), a.dtype) for n, a in arrays.items()}
+        return Trace(**{n: np.concatenate([a, room[n]]) for n, a in arrays.items()})
 
     def __len__(self) -> int:
         return len(self.t)

@@ -53,21 +53,26 @@ def prepared(packed: bytes) -> Prepared:
     sweep: Sweep = pickle.loads(packed)
     known = controllers(sweep.scenario.control)
     controls = {name: known[name] for name in sweep.controllers}
-    if sweep.planning is not None:
-        planned = Preparation.of(planned_tilt(sweep.scenario, sweep.planning))
-        preparations = dict.fromkeys(controls, planned)
-    else:
-        path = plan_joints(sweep.scenario)
-        preparations = {
-            name: prepare(sweep.scenario, control, check=False, joint_path=path)
-            for name, control in controls.items()
-        }
+    preparations = _prepared(sweep, controls)
     return Prepared(
         sweep=sweep,
         controls=controls,
         preparations=preparations,
-        joints=RobotModel(sweep.scenario).joints,
+        joints=next(iter(preparations.values())).robot.joints,
     )
+
+
+def _prepared(sweep: Sweep, controls: dict[str, Control]) -> dict[str, Preparation]:
+    scenario, robot = sweep.scenario, RobotModel(sweep.scenario)
+    if sweep.planning is not None:
+        planned = planned_tilt(scenario, sweep.planning, robot)
+        preparation = Preparation(robot, planned.joint_path, planned.grip, planned)
+        return dict.fromkeys(controls, preparation)
+    path = plan_joints(scenario)
+    return {
+        name: prepare(scenario, control, joint_path=path, robot=robot)
+        for name, control in controls.items()
+    }
 
 
 def check_holdable(sweep: Sweep) -> None:

@@ -2,16 +2,11 @@
 
 from __future__ import annotations
 
-import warnings
-
 import numpy as np
 
 from fulcrum.sim.world.faults import Fault, FaultKind, of_kinds
 from fulcrum.sim.world.world import World
 from fulcrum.synthesis.arrays import Array
-
-with warnings.catch_warnings():  # dm_control looks for a display on import; none is needed
-    warnings.simplefilter("ignore")
 
 
 class Motors:

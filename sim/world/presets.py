@@ -5,10 +5,9 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, replace
 
-import mujoco
 import numpy as np
 
-from fulcrum.sim.model.scene import compose
+from fulcrum.sim.model.scene import compose, object_bounds
 from fulcrum.sim.motion.schedule import Schedule
 from fulcrum.sim.scenario.scenario import Scenario
 from fulcrum.sim.world.world import Push, World
@@ -151,7 +150,8 @@ def draw(uncertainty: Uncertainty, scenario: Scenario, seed: int) -> World:
     joint_friction = u.joint_friction * limits * random.uniform(0.0, 1.0, joints)
     gain = 1.0 + within(u.torque_gain, joints)
     offset = within(u.torque_offset, joints) * limits
-    pushes = tuple(_push(u, scenario, scene, random) for _ in range(u.pushes))
+    bounds = object_bounds(scenario, scene)
+    pushes = tuple(_push(u, scenario, bounds, random) for _ in range(u.pushes))
     return World(
         seed=seed,
         mass=mass,
@@ -181,7 +181,10 @@ def _one_per_pair(scenario: Scenario, friction: Array) -> tuple[float, ...]:
 
 
 def _push(
-    u: Uncertainty, scenario: Scenario, scene: mujoco.MjModel, random: np.random.Generator
+    u: Uncertainty,
+    scenario: Scenario,
+    bounds: tuple[Array, Array],
+    random: np.random.Generator,
 ) -> Push:
     """At any time while the object is held, in any direction, anywhere within its bounds."""
     schedule = Schedule(scenario)
@@ -190,21 +193,6 @@ def _push(
     t = float(random.uniform(first, last))
     direction = random.normal(size=3)
     force = u.push * random.uniform() * direction / np.linalg.norm(direction)
-    low, high = _bounds(scenario, scene)
     x, y, z = force.tolist()
-    a, b, c = random.uniform(low, high).tolist()
+    a, b, c = random.uniform(*bounds).tolist()
     return Push(t, u.push_s, (x, y, z), (a, b, c))
-
-
-def _bounds(scenario: Scenario, scene: mujoco.MjModel) -> tuple[Array, Array]:
-    """Opposite corners of the bounds of the object's geoms, in the object frame [m]."""
-    corners = []
-    for name in (geom.name for geom in scenario.object.geoms):
-        geom = scene.geom(name)
-        center, half = scene.geom_aabb[geom.id].reshape(2, 3)
-        R = np.zeros(9)
-        mujoco.mju_quat2Mat(R, geom.quat)
-        signs = np.array(np.meshgrid(*[(-1.0, 1.0)] * 3)).reshape(3, -1).T
-        corners.append(geom.pos + (center + signs * half) @ R.reshape(3, 3).T)
-    points = np.concatenate(corners)
-    return points.min(axis=0), points.max(axis=0)

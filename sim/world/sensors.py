@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-import mujoco
 import numpy as np
 
+from fulcrum.sim.geometry import quaternion
 from fulcrum.sim.signals.measurement import Measurement
 from fulcrum.sim.world.faults import Fault, FaultKind, of_kinds
 from fulcrum.sim.world.world import World
@@ -36,42 +36,43 @@ class Sensors:
         self._deviations = flat[flat > 0.0]
 
     def see(self, truth: Measurement) -> Measurement:
-        """The measurement as the controller gets it."""
+        """Return the measurement as the controller gets it."""
+        seen = truth
         if self._deviations.size:
-            self._add_noise(truth)
+            seen = self._noisy(seen)
         if self._encoder_faults:
-            self._break_encoders(truth)
+            seen = self._with_broken_encoders(seen)
         if self._pose_faults:
-            self._break_tracking(truth)
-        return truth
+            seen = self._with_broken_tracking(seen)
+        return seen
 
-    def _add_noise(self, seen: Measurement) -> None:
+    def _noisy(self, seen: Measurement) -> Measurement:
         world, joints = self._world, len(self._joints)
+        _, q, qd, p_WO, quat_WO, _ = seen
         noise = self._deviations * self._random.standard_normal(len(self._deviations))
         if world.encoder_noise > 0.0:
-            seen.q, seen.qd = seen.q + noise[:joints], seen.qd + noise[joints : 2 * joints]
+            q, qd = q + noise[:joints], qd + noise[joints : 2 * joints]
             noise = noise[2 * joints :]
         if world.position_noise > 0.0:
-            seen.p_WO = seen.p_WO + noise[:3]
+            p_WO = p_WO + noise[:3]
         if world.orientation_noise > 0.0:
-            turned = seen.quat_WO.copy()
-            mujoco.mju_quatIntegrate(turned, noise[-3:], 1.0)
-            seen.quat_WO = turned
+            quat_WO = quaternion.turned(quat_WO, noise[-3:])
+        return seen._replace(q=q, qd=qd, p_WO=p_WO, quat_WO=quat_WO)
 
-    def _break_encoders(self, seen: Measurement) -> None:
+    def _with_broken_encoders(self, seen: Measurement) -> Measurement:
         states = np.array([seen.q, seen.qd])
         for fault in self._encoder_faults:
             if fault.active(seen.t):
                 joint = self._joints.index(fault.joint)
                 states[:, joint] = self._broken(fault, states[:, joint])
-        seen.q, seen.qd = states
+        return seen._replace(q=states[0], qd=states[1])
 
-    def _break_tracking(self, seen: Measurement) -> None:
+    def _with_broken_tracking(self, seen: Measurement) -> Measurement:
         pose = np.concatenate([seen.p_WO, seen.quat_WO])
         for fault in self._pose_faults:
             if fault.active(seen.t):
                 pose = self._broken(fault, pose)
-        seen.p_WO, seen.quat_WO = pose[:3], pose[3:]
+        return seen._replace(p_WO=pose[:3], quat_WO=pose[3:])
 
     def _broken(self, fault: Fault, values: Array) -> Array:
         """What a sensor gives instead of these values: the first that it froze at, or NaN."""

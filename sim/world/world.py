@@ -5,16 +5,15 @@ Truth goes to the plant, its sensors and its wires alone; the controller keeps i
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
-import mujoco
 import numpy as np
 
 from fulcrum.sim.geometry.geom import Geom
 from fulcrum.sim.geometry.object import Object
 from fulcrum.sim.geometry.pose import Vector, triple
 from fulcrum.sim.model.contacts import contact_axes
-from fulcrum.sim.model.scene import hand_body, tip_site
 from fulcrum.sim.scenario.contacts import Friction, Hand, Rest, Support
 from fulcrum.sim.scenario.scenario import Scenario
 from fulcrum.sim.world.faults import Fault
@@ -116,6 +115,18 @@ class World:
         if not 0.0 <= self.dropped < 1.0:
             raise InvalidInputError("world.dropped", self.dropped, "in [0, 1)")
 
+    def check_joints(self, joints: Sequence[str]) -> None:
+        """Refuse a world that does not fit these driven joints.
+
+        Raises:
+            InvalidInputError: A tuple has another length, or a fault names none of them.
+        """
+        for name in ("link_mass", "joint_friction", "torque_gain", "torque_offset"):
+            _check_length(name, getattr(self, name), len(joints))
+        for fault in self.faults:
+            if fault.joint and fault.joint not in joints:
+                raise InvalidInputError("fault.joint", fault.joint, f"one of {', '.join(joints)}")
+
     def truth(self, scenario: Scenario) -> Scenario:
         """The scenario as it truly is: object, contacts, and where the object lies.
 
@@ -169,34 +180,6 @@ class World:
             friction=_slipperier(support.friction, friction),
             p_OP_O=_scaled(self.size, support.p_OP_O),
         )
-
-    def change(self, scenario: Scenario, model: mujoco.MjModel) -> None:
-        """Makes a compiled scene's robot what it truly is: hands on wrists, masses, friction.
-
-        Raises:
-            InvalidInputError: A tuple has another length than the robot has driven joints.
-        """
-        joints = [int(model.actuator(i).trnid[0]) for i in range(model.nu)]
-        for name in ("link_mass", "joint_friction", "torque_gain", "torque_offset"):
-            _check_length(name, getattr(self, name), len(joints))
-        names = [model.joint(joint).name for joint in joints]
-        for fault in self.faults:
-            if fault.joint and fault.joint not in names:
-                raise InvalidInputError("fault.joint", fault.joint, f"one of {', '.join(names)}")
-        for hand, place in zip(scenario.hands, self.hand_place, strict=False):
-            pad, site = model.body(hand_body(hand)).id, model.site(tip_site(hand)).id
-            offset = np.array([*place, 0.0])
-            for quaternion in (model.site_quat[site], model.body_quat[pad]):
-                mujoco.mju_rotVecQuat(offset, offset.copy(), quaternion)
-            model.body_pos[pad] += offset
-        for joint, factor in zip(joints, self.link_mass, strict=False):
-            body = model.jnt_bodyid[joint]
-            model.body_mass[body] *= factor
-            model.body_inertia[body] *= factor
-        dofs = model.jnt_dofadr[joints]
-        if self.joint_friction:
-            model.dof_frictionloss[dofs] = self.joint_friction
-        mujoco.mj_setConst(model, mujoco.MjData(model))
 
 
 # The truth is as believed.

@@ -14,11 +14,11 @@ import numpy as np
 import pytest
 
 from fulcrum.scenarios import scenario
-from fulcrum.sim.control.controller import Controller
+from fulcrum.sim.control.controller import ForceController
 from fulcrum.sim.evaluation.monitor import Monitor
-from fulcrum.sim.model.robot import RobotModel
+from fulcrum.sim.model.robot import RobotModel, RobotState
 from fulcrum.sim.model.statics import Statics
-from fulcrum.sim.plant.mujoco import Plant
+from fulcrum.sim.plant.mujoco import MujocoPlant
 from fulcrum.sim.recording import Recorder
 from fulcrum.sim.run.execute import Request, execute
 from fulcrum.sim.run.loop import ClosedLoop
@@ -29,16 +29,15 @@ START = "start-up and memory"
 RATES = (100, 250, 500, 1000)
 # Which calls belong to which part; time counts for the innermost.
 PARTS = {
-    "physics": [(Plant, "step")],
+    "physics": [(MujocoPlant, "step")],
     "model": [
-        (RobotModel, "update"),
-        (RobotModel, "mass_matrix"),
-        (RobotModel, "gravity"),
-        (RobotModel, "contact_jacobians"),
+        (RobotModel, "at"),
+        (RobotState, "mass_matrix"),
+        (RobotState, "contact_jacobians"),
     ],
     "solve": [(Synthesizer, "solve")],
     "assembly": [(Statics, "problem")],
-    "control": [(Controller, "command")],
+    "control": [(ForceController, "command")],
     "monitor": [(Monitor, "update")],
     "recording": [(Recorder, "write"), (Recorder, "close")],
     "loop": [(ClosedLoop, "_step")],
@@ -46,22 +45,22 @@ PARTS = {
 FIRST_STEP = """
 from pathlib import Path
 import sys
-from scenarios import scenario
+from fulcrum.scenarios import scenario
 from fulcrum.sim.run.execute import Request, execute
-from fulcrum.sim.plant.mujoco import Plant
-step = Plant.step
+from fulcrum.sim.plant.mujoco import MujocoPlant
+step = MujocoPlant.step
 def first(self):
     step(self)
     print("stepped", flush=True)
     sys.exit()
-Plant.step = first
+MujocoPlant.step = first
 box_tilt = scenario("box-tilt")
 execute(Request(box_tilt, "margin", box_tilt.control, out=Path(sys.argv[1])))
 """
 WHOLE_RUN = """
 from pathlib import Path
 import sys
-from scenarios import scenario
+from fulcrum.scenarios import scenario
 from fulcrum.sim.run.execute import Request, execute
 box_tilt = scenario("box-tilt")
 execute(Request(box_tilt, "margin", box_tilt.control, out=Path(sys.argv[1])))
@@ -125,7 +124,7 @@ def test_real_time_factor(rate, tmp_path, table):
 def test_bare_steps(at_1000_hz, table):
     result = at_1000_hz
     tau = result.trace.tau
-    plant = Plant(scenario("box-tilt"))
+    plant = MujocoPlant(scenario("box-tilt"))
     plant.reset(result.trace.q[0])
     model, data = plant.physics.model.ptr, plant.physics.data.ptr
     started = time.perf_counter()

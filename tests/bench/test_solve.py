@@ -69,7 +69,7 @@ class BoxPath:
         box_tilt = scenario("box-tilt")
         path, joint_path = ScrewPath(box_tilt.path), plan_joints(box_tilt)
         self.robot = RobotModel(box_tilt)
-        self.statics = Statics(box_tilt, box_tilt.control, self.robot)
+        self.statics = Statics(box_tilt, box_tilt.control)
         self.synthesizer = Synthesizer()
         self.states = []
         for tilt in np.linspace(0.0, path.end, POSES):
@@ -88,8 +88,7 @@ class BoxPath:
         return self.tick, self.states
 
     def problem(self, q, p_WO, quat_WO):
-        self.robot.update(q)
-        return self.statics.problem(p_WO, quat_WO)
+        return self.statics.problem(self.robot.at(q), p_WO, quat_WO)
 
     def tick(self, q, p_WO, quat_WO):
         return self.synthesizer.solve(self.problem(q, p_WO, quat_WO))

@@ -69,10 +69,10 @@ def belief_facts(belief, hands):
     p_WC, R_WC = sampled_contacts(hands)
     gravity, mass, jacobians = [], [], []
     for q in sampled_positions(belief):
-        belief.update(q)
-        gravity.append(belief.gravity())
-        mass.append(belief.mass_matrix())
-        jacobians.extend(belief.contact_jacobians(p_WC, R_WC))
+        state = belief.at(q)
+        gravity.append(state.tau_g)
+        mass.append(state.mass_matrix())
+        jacobians.extend(state.contact_jacobians(p_WC, R_WC))
     return {
         "gravity": np.array(gravity),
         "mass": np.array(mass),

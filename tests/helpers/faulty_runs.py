@@ -142,8 +142,8 @@ def faulty_run(name, guarded=True):
     world, _, _, _, scene = CASES[name]
     control = scene.control if guarded else replace(scene.control, guard=UNGUARDED)
     out = Path(tempfile.mkdtemp()) / "run" if guarded else None
-    anyway = scene is TOO_FAR
-    request = Request(scene, "margin", control, world=world, out=out, anyway=anyway)
+    best_effort = scene is TOO_FAR
+    request = Request(scene, "margin", control, world=world, out=out, best_effort=best_effort)
     return Faulty(execute(request), None if out is None else out / "run.rrd")
 
 

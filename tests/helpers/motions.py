@@ -23,7 +23,7 @@ DT = BOX.physics.timestep
 SETTLED = round(GRIP_S / DT)
 STEPS = round(Schedule(BOX).total_s / DT)
 LEFT, RIGHT, EDGE_LEFT, EDGE_RIGHT = range(4)
-FIELDS = ("R_WC", "w_OC_C", "kept", "slip", "slide", "spin", "utilisation")
+FIELDS = ("R_WC", "w_measured_C", "kept", "slip", "slide", "spin", "utilisation")
 # Sums of 300 terms of 1e-3 and rotations of points at 1 m.
 ROUNDING = 1e-13
 TANGENT, ACROSS = np.array([0.0, 0.0, 1.0]), np.array([1.0, 0.0, 0.0])

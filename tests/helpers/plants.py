@@ -13,7 +13,7 @@ from fulcrum.sim.model.contacts import ContactFrames
 from fulcrum.sim.model.object_path import ScrewPath
 from fulcrum.sim.model.robot import RobotModel
 from fulcrum.sim.motion.ik import plan_joints
-from fulcrum.sim.plant.mujoco import Plant
+from fulcrum.sim.plant.mujoco import MujocoPlant
 
 BOX = scenario("box-tilt")
 WEIGHT = BOX.object.mass * GRAVITY
@@ -38,7 +38,7 @@ def start_at(tilt_deg):
 
 def plant_at(tilt_deg):
     """A plant that starts at rest at a tilt, and the arms' angles that hold the box there."""
-    plant = Plant(replace(BOX, path=replace(BOX.path, start=start_at(tilt_deg))))
+    plant = MujocoPlant(replace(BOX, path=replace(BOX.path, start=start_at(tilt_deg))))
     q = planned().holding(np.radians(tilt_deg))
     plant.reset(q)
     return plant, q
@@ -53,9 +53,9 @@ def push(plant, q_d, f_n, steps):
     for _ in range(steps):
         m = plant.measure()
         R_WO = rotation_of(m)
-        ROBOT.update(m.q)
+        robot = ROBOT.at(m.q)
         p_WC, R_WC = FRAMES.points(R_WO, m.p_WO)[:HANDS], FRAMES.in_world(R_WO)[:HANDS]
-        forces = np.einsum("nl,n->l", ROBOT.contact_jacobians(p_WC, R_WC)[:, 2], f_n)
+        forces = np.einsum("nl,n->l", robot.contact_jacobians(p_WC, R_WC)[:, 2], f_n)
         impedance = BANDWIDTH**2 * (q_d - m.q) - 2.0 * BANDWIDTH * m.qd
-        plant.apply(ROBOT.gravity() + forces + ROBOT.mass_matrix() @ impedance)
+        plant.apply(robot.tau_g + forces + robot.mass_matrix() @ impedance)
         plant.step()

@@ -13,7 +13,7 @@ from fulcrum.sim.evaluation.monitor import ContactHistory, Monitor
 from fulcrum.sim.evaluation.report import Report, RunInfo
 from fulcrum.sim.geometry.geom import Geom
 from fulcrum.sim.geometry.pose import Pose
-from fulcrum.sim.run.loop import ClosedLoop
+from fulcrum.sim.run.assembly import closed_loop
 from fulcrum.sim.scenario.control import Control, controllers
 from fulcrum.sim.scenario.phases import REACH, Phase, stretched
 from fulcrum.sim.scenario.scenario import Scenario
@@ -138,12 +138,12 @@ FAILING = [
 @functools.cache
 def run(name, case):
     s, control, truth, seed = CASES[case](scenario(name))
-    loop = ClosedLoop(s, control, truth=truth, seed=seed)
+    loop = closed_loop(s, control, truth=truth, seed=seed)
     monitor = Monitor(truth or s)
     history = ContactHistory.concatenate([monitor.update(block) for block in loop.run()])
     robot = loop.robot
     judge = Judge(truth or s, robot.joints, robot.tau_min, robot.tau_max)
-    info = RunInfo(case, control.objective, seed, wall_s=1.0, collisions=loop.collisions)
+    info = RunInfo(case, control.objective, seed, wall_s=1.0, collisions=loop.plant.collisions)
     return Outcome(judge.report(info, loop.trace, history), loop.trace, history)
 
 
@@ -165,7 +165,7 @@ def violated(name, trace, history):
     s, rows = scenario(name), settled(name, trace)
     limits = s.tolerances
     error_deg = np.degrees(np.abs(trace.tilt - trace.tilt_ref))
-    normal, command = history.w_OC_C[..., N], trace.w_command_C[..., N]
+    normal, command = history.w_measured_C[..., N], trace.w_commanded_C[..., N]
     # How supports at the same point share its force is indeterminate: see test_box_wall.py.
     points = [hand.p_OC_O for hand in s.hands] + [support.p_OP_O for support in s.supports]
     alone = [points.count(point) == 1 for point in points]

@@ -17,7 +17,7 @@ from hypothesis import strategies as st
 from fulcrum.scenarios import scenario, scenarios
 from fulcrum.scenarios.cli import main
 from fulcrum.sim.planning.path_problems import PathProblems
-from fulcrum.sim.run.loop import ClosedLoop
+from fulcrum.sim.run.assembly import closed_loop
 from fulcrum.sim.world.faults import Fault, FaultKind
 from fulcrum.sim.world.presets import FIELD, draw
 from fulcrum.synthesis import Contact, FulcrumError, Joints, Problem, Synthesizer
@@ -245,7 +245,7 @@ def bad_config(data):
         scene, world = made["scenario"], made["world"]
         if which == "ranges":
             world = draw(made["ranges"], scene, seed=1)
-        loop = ClosedLoop(scene, scene.control, world=world)
+        loop = closed_loop(scene, scene.control, world=world)
         block = next(loop.run())
         return block.tau, block.q, block.p_WO, block.tilt
 

@@ -26,7 +26,7 @@ def test_the_box_ends_at_90_deg_and_is_never_off_by_more_than_0_2_deg():
 def test_the_box_neither_slips_nor_slides_nor_spins_nor_lets_go():
     _, trace, history = run(BOX, "default")
     rows = settled(BOX, trace)
-    assert history.w_OC_C[rows][..., N].min() > 0.0
+    assert history.w_measured_C[rows][..., N].min() > 0.0
     assert 1e3 * history.slip[rows].max() <= 0.1
     assert 1e3 * history.slide[rows].max() <= 0.1
     assert np.degrees(np.abs(history.spin[rows])).max() <= 0.1
@@ -35,8 +35,8 @@ def test_the_box_neither_slips_nor_slides_nor_spins_nor_lets_go():
 
 def test_the_box_is_held_with_the_commanded_forces_and_no_torque_saturates():
     _, trace, history = run(BOX, "default")
-    rows, command = settled(BOX, trace), trace.w_command_C[..., N]
-    rms = np.sqrt(np.mean((history.w_OC_C[..., N] - command)[rows] ** 2, axis=0))
+    rows, command = settled(BOX, trace), trace.w_commanded_C[..., N]
+    rms = np.sqrt(np.mean((history.w_measured_C[..., N] - command)[rows] ** 2, axis=0))
     assert (rms <= 0.02 * command.max(axis=0)).all()
     assert not trace.saturated.any()
     # Not because next to nothing is commanded: the paper's grip of 27.2 N at a factor of 1, more
@@ -99,8 +99,8 @@ def test_the_box_stands_at_the_end():
     # On its near face, which is 0.1 m deep: its centre is 0.15 m up and 0.05 m before the edge.
     np.testing.assert_allclose(last.p_WO[-1], [0.45, 0.0, 0.15], rtol=0, atol=1e-4)
     # No hand holds it, and the edge carries half of its weight: the other two corners the rest.
-    np.testing.assert_array_equal(history.w_OC_C[-1000:, :2], 0.0)
-    assert history.w_OC_C[-1, 2:, N].sum() == pytest.approx(10.0, abs=0.01)
+    np.testing.assert_array_equal(history.w_measured_C[-1000:, :2], 0.0)
+    assert history.w_measured_C[-1, 2:, N].sum() == pytest.approx(10.0, abs=0.01)
     hands = trace.p_WE[-1] - trace.p_WC[-1, :2]
     # 60 mm and the ball's radius.
     assert np.linalg.norm(hands, axis=1) == pytest.approx(0.09, abs=1e-3)

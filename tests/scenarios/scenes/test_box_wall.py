@@ -66,12 +66,12 @@ def test_supports_at_one_place_are_judged_by_the_force_there():
     assert outcome.report.verdict is Verdict.PASS, outcome.report.failures
     contacts, limits = outcome.report.contacts, WALL.tolerances
     # Alone the foot is far from its commanded force, and its friction is used up.
-    peak = outcome.trace.w_command_C[:, FOOT_LEFT, N].max()
+    peak = outcome.trace.w_commanded_C[:, FOOT_LEFT, N].max()
     assert contacts["foot_left"].force_error_rms_n > 5 * limits.force_error * peak
     assert contacts["foot_left"].max_utilisation > limits.utilisation
     # What is not there is missed, also where the wall would only have to take more.
-    less = outcome.history.w_OC_C.copy()
+    less = outcome.history.w_measured_C.copy()
     less[:, FOOT_LEFT, :3] *= 0.7
-    history = replace(outcome.history, w_OC_C=less)
+    history = replace(outcome.history, w_measured_C=less)
     (failure,) = judge_of(WALL).report(INFO, outcome.trace, history).failures
     assert failure.startswith("Contacts foot_left and wall_left together followed")

@@ -14,7 +14,7 @@ LEAVING = [name for name in NAMES if scenario(name).phases[-1].gap > 0.0]
 
 def hand_forces(name, case="default"):
     """Normal forces of the hands, (k, n)."""
-    return run(name, case).history.w_OC_C[:, : len(scenario(name).hands), N]
+    return run(name, case).history.w_measured_C[:, : len(scenario(name).hands), N]
 
 
 def free_rows(name, trace):
@@ -51,7 +51,7 @@ def test_no_hand_pushes_before_it_is_to_touch_or_after_it_has_withdrawn(name):
     off = off_rows(name, trace)
     assert off.any()
     np.testing.assert_array_equal(forces[off], 0.0)
-    assert not trace.w_command_C[free_rows(name, trace)].any()
+    assert not trace.w_commanded_C[free_rows(name, trace)].any()
     # In the grip they do.
     assert forces[~free_rows(name, trace)].max() > 5.0
 
@@ -64,8 +64,8 @@ def test_hands_touch_and_leave_with_less_than_their_grip(name):
         found = report.contacts[hand.name].free_normal_n
         assert found == forces[free, i].max()
         # Measured 0.87 N of 34 N (box).
-        assert found <= trace.w_command_C[:, i, N].max()
-        assert found < 0.1 * trace.w_command_C[:, i, N].max()
+        assert found <= trace.w_commanded_C[:, i, N].max()
+        assert found < 0.1 * trace.w_commanded_C[:, i, N].max()
 
 
 @pytest.mark.parametrize("name", NAMES)
@@ -105,7 +105,7 @@ def test_the_last_phase_is_with_hands_off(name):
 def test_a_hand_that_hits_too_hard_is_caught():
     report, trace, _ = run(BOX, "hard")
     forces = hand_forces(BOX, "hard")[trace.phase <= 1]
-    peak = trace.w_command_C[:, :2, N].max(axis=0)
+    peak = trace.w_commanded_C[:, :2, N].max(axis=0)
     assert (forces.max(axis=0) > peak).all()
     assert report.verdict is Verdict.FAIL
     told = [f for f in report.failures if "hit the object with" in f]

@@ -12,7 +12,7 @@ import pytest
 from fulcrum.scenarios import scenario
 from fulcrum.sim.evaluation.report import Verdict
 from fulcrum.sim.model.contacts import true_contacts
-from fulcrum.sim.run.loop import ClosedLoop
+from fulcrum.sim.run.assembly import closed_loop
 from fulcrum.sim.signals.trace import Trace
 from fulcrum.synthesis import ContactModel
 from fulcrum.synthesis.arrays import N
@@ -41,7 +41,7 @@ def test_the_friction_utilisation_is_that_of_the_contact_forces(name):
     _, trace, history = run(name, "default")
     rows = settled(name, trace)
     for i, contact in enumerate(true_contacts(scenario(name))):
-        f_t, f_o, f_n, _, _, m_n = history.w_OC_C[rows, i].T
+        f_t, f_o, f_n, _, _, m_n = history.w_measured_C[rows, i].T
         tangential = f_t**2 + f_o**2
         if contact.model is ContactModel.SFCE:
             tangential = tangential + (m_n / contact.e_n) ** 2
@@ -81,7 +81,7 @@ def first_row(name, outcome, contact, what):
     i = s.contact_names.index(contact)
     allowed = 1e-3 * s.tolerances.slip_mm
     did = {
-        "let go": history.w_OC_C[:, i, N] <= 0.0,
+        "let go": history.w_measured_C[:, i, N] <= 0.0,
         "slipped": history.slip[:, i] > allowed,
         "slid": history.slide[:, i] > allowed,
     }[what]
@@ -132,7 +132,7 @@ def test_a_seed_decides_the_trace_from_the_first_step_on(name):
 
     def begin(seed):
         """The first 0.3 s of a run."""
-        loop = ClosedLoop(s, s.control, seed=seed)
+        loop = closed_loop(s, s.control, seed=seed)
         blocks = loop.run()
         next(blocks), next(blocks)
         return loop.trace.rows(0, 300)

@@ -8,7 +8,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from fulcrum.scenarios import scenario
-from fulcrum.sim.control.controller import Controller
+from fulcrum.sim.control.controller import ForceController
 from fulcrum.sim.model.object_path import ScrewPath
 from fulcrum.sim.model.robot import RobotModel
 from fulcrum.sim.model.statics import Statics
@@ -39,7 +39,9 @@ def planned():
 
 
 def controller(control=CONTROL, scene=BOX):
-    return Controller(scene, control, RobotModel(scene), planned())
+    made = ForceController(control, planned())
+    made.reset(scene, RobotModel(scene), seed=0)
+    return made
 
 
 def measured(tilt_deg, t, q=None, qd=None):
@@ -52,9 +54,8 @@ def measured(tilt_deg, t, q=None, qd=None):
 
 
 def problem_of(measurement):
-    belief = RobotModel(BOX)
-    belief.update(measurement.q)
-    return Statics(BOX, CONTROL, belief).problem(measurement.p_WO, measurement.quat_WO)
+    robot = RobotModel(BOX).at(measurement.q)
+    return Statics(BOX, CONTROL).problem(robot, measurement.p_WO, measurement.quat_WO)
 
 
 def heavier(weight):
@@ -73,7 +74,7 @@ def test_gripped_and_on_its_path_it_commands_the_synthesised_torques():
         solution = Synthesizer().solve(problem)
         # The reference is the measured state up to the spline's rounding, times omega^2 M.
         np.testing.assert_allclose(command.tau, solution.tau, rtol=0, atol=1e-10)
-        np.testing.assert_array_equal(command.w_OC_C, solution.w_OC_C)
+        np.testing.assert_array_equal(command.w_commanded_C, solution.w_OC_C)
         assert np.abs(command.tau - problem.joints.tau_g).max() > 1.0
         assert not command.failed
         assert not command.saturated.any()
@@ -92,9 +93,9 @@ def test_without_grip_it_only_holds_the_arms_up(t):
     measurement = resting_where_it_should_be(t)
     command = controller().command(measurement)
     belief = RobotModel(BOX)
-    belief.update(measurement.q)
-    np.testing.assert_allclose(command.tau, belief.gravity(), rtol=0, atol=1e-10)
-    np.testing.assert_array_equal(command.w_OC_C, 0.0)
+    state = belief.at(measurement.q)
+    np.testing.assert_allclose(command.tau, state.tau_g, rtol=0, atol=1e-10)
+    np.testing.assert_array_equal(command.w_commanded_C, 0.0)
 
 
 def test_nothing_is_synthesised_in_phases_that_ask_for_no_grip():
@@ -118,14 +119,14 @@ def test_half_way_through_letting_go_it_commands_half_of_the_forces():
     )
     half = controller().command(measured(90.0, float(letting_go)))
     full = controller().command(measured(90.0, END_S))
-    np.testing.assert_allclose(half.w_OC_C, full.w_OC_C / 2.0, rtol=0, atol=ROUNDING)
-    assert full.w_OC_C[:2, 2].min() > 5.0
+    np.testing.assert_allclose(half.w_commanded_C, full.w_commanded_C / 2.0, rtol=0, atol=ROUNDING)
+    assert full.w_commanded_C[:2, 2].min() > 5.0
 
 
 def test_half_way_through_the_grip_it_commands_half_of_the_forces():
     half = controller().command(measured(0.0, (TOUCHED_S + GRIPPED_S) / 2.0))
     full = controller().command(measured(0.0, GRIPPED_S))
-    np.testing.assert_allclose(half.w_OC_C, full.w_OC_C / 2.0, rtol=0, atol=ROUNDING)
+    np.testing.assert_allclose(half.w_commanded_C, full.w_commanded_C / 2.0, rtol=0, atol=ROUNDING)
     none = controller().command(measured(0.0, TOUCHED_S))
     np.testing.assert_allclose(half.tau, (full.tau + none.tau) / 2.0, rtol=0, atol=1e-10)
 
@@ -135,9 +136,9 @@ def test_without_feedforward_it_never_commands_forces():
     measurement = measured(0.0, GRIPPED_S)
     command = controller(control).command(measurement)
     belief = RobotModel(BOX)
-    belief.update(measurement.q)
-    np.testing.assert_allclose(command.tau, belief.gravity(), rtol=0, atol=1e-10)
-    np.testing.assert_array_equal(command.w_OC_C, 0.0)
+    state = belief.at(measurement.q)
+    np.testing.assert_allclose(command.tau, state.tau_g, rtol=0, atol=1e-10)
+    np.testing.assert_array_equal(command.w_commanded_C, 0.0)
 
 
 def test_a_deviation_is_answered_by_impedance_of_the_bandwidth():
@@ -149,8 +150,8 @@ def test_a_deviation_is_answered_by_impedance_of_the_bandwidth():
     # Forces, gravity and mass matrix are those of the measured angles, so that they drop out.
     q, qd_ref = q_ref + dq, slope * rate
     belief = RobotModel(BOX)
-    belief.update(q)
-    M = belief.mass_matrix()
+    state = belief.at(q)
+    M = state.mass_matrix()
     moving = controller().command(measured(tilt_deg, t, q, qd_ref + dqd))
     stiffer = replace(CONTROL, bandwidth=0.0)
     passive = controller(stiffer).command(measured(tilt_deg, t, q, qd_ref + dqd))
@@ -181,9 +182,9 @@ def test_synthesis_is_due_every_so_many_ticks_and_its_forces_hold_between():
     commands = [it.command(measured(tilt, GRIPPED_S)) for tilt in tilts]
     assert [c.synthesis_s > 0.0 for c in commands] == [True, False, False, True, False]
     for kept in commands[1:3]:
-        np.testing.assert_array_equal(kept.w_OC_C, commands[0].w_OC_C)
-    assert np.abs(commands[3].w_OC_C - commands[0].w_OC_C).max() > 0.1
-    np.testing.assert_array_equal(commands[4].w_OC_C, commands[3].w_OC_C)
+        np.testing.assert_array_equal(kept.w_commanded_C, commands[0].w_commanded_C)
+    assert np.abs(commands[3].w_commanded_C - commands[0].w_commanded_C).max() > 0.1
+    np.testing.assert_array_equal(commands[4].w_commanded_C, commands[3].w_commanded_C)
 
 
 # --- when it cannot ---
@@ -196,7 +197,7 @@ def test_it_holds_the_last_forces_and_says_so_when_there_is_no_solution():
     assert not upright.failed
     flat = it.command(measured(0.0, GRIPPED_S))
     assert flat.failed
-    np.testing.assert_array_equal(flat.w_OC_C, upright.w_OC_C)
+    np.testing.assert_array_equal(flat.w_commanded_C, upright.w_commanded_C)
     assert np.isfinite(flat.tau).all()
     # It recovers as soon as there is one.
     again = it.command(measured(80.0, GRIPPED_S))
@@ -204,11 +205,11 @@ def test_it_holds_the_last_forces_and_says_so_when_there_is_no_solution():
     # The grip, which is minimised, to the solver's 1e-9 of 60 N. The edge bears what the hands'
     # friction does not, and that moves along the curve of the cone by the root of a change of grip:
     # sqrt(1e-9) of 60 N is 2e-3 N; measured 1.1e-6.
-    difference = again.w_OC_C[:, N] - upright.w_OC_C[:, N]
+    difference = again.w_commanded_C[:, N] - upright.w_commanded_C[:, N]
     np.testing.assert_allclose(difference[:2], 0.0, rtol=0, atol=1e-7)
     np.testing.assert_allclose(difference[2:], 0.0, rtol=0, atol=1e-5)
     # What the edge's ends push against each other is free, and depends on what was solved before.
-    np.testing.assert_allclose(again.w_OC_C, upright.w_OC_C, rtol=0, atol=1e-3)
+    np.testing.assert_allclose(again.w_commanded_C, upright.w_commanded_C, rtol=0, atol=1e-3)
 
 
 def test_the_true_weight_has_a_solution_at_the_same_tilts():
@@ -222,9 +223,9 @@ def test_without_any_solution_it_only_holds_the_arms_up():
     command = controller(scene=heavier(500.0)).command(measurement)
     assert command.failed
     belief = RobotModel(BOX)
-    belief.update(measurement.q)
-    np.testing.assert_allclose(command.tau, belief.gravity(), rtol=0, atol=1e-10)
-    np.testing.assert_array_equal(command.w_OC_C, 0.0)
+    state = belief.at(measurement.q)
+    np.testing.assert_allclose(command.tau, state.tau_g, rtol=0, atol=1e-10)
+    np.testing.assert_array_equal(command.w_commanded_C, 0.0)
 
 
 @pytest.mark.parametrize("seed", range(10))
@@ -247,11 +248,11 @@ def test_torques_are_finite_and_within_limits_and_cuts_are_flagged(seed):
 
 
 def test_without_the_object_s_pose_it_sends_no_forces_but_holds_the_arms_up():
-    measurement = replace(measured(0.0, GRIPPED_S), p_WO=np.array([0.65, np.nan, 0.05]))
+    measurement = measured(0.0, GRIPPED_S)._replace(p_WO=np.array([0.65, np.nan, 0.05]))
     command = controller().command(measurement)
     belief = RobotModel(BOX)
-    belief.update(measurement.q)
-    np.testing.assert_allclose(command.tau, belief.gravity(), rtol=0, atol=1e-10)
+    state = belief.at(measurement.q)
+    np.testing.assert_allclose(command.tau, state.tau_g, rtol=0, atol=1e-10)
     assert command.synthesis_s == 0.0
 
 
@@ -272,7 +273,7 @@ def test_margin_controller_is_the_scenario_s_own_and_holds_more():
     assert margin.preload > 0.0
     alone = {"solve_every": 1, "guard": UNGUARDED}
     grips = {
-        name: controller(replace(control, **alone)).command(measured(71.0, GRIPPED_S)).w_OC_C
+        name: controller(replace(control, **alone)).command(measured(71.0, GRIPPED_S)).w_commanded_C
         for name, control in controllers(BOX.control).items()
     }
     assert grips["paper"][:2, 2].max() < 1.0

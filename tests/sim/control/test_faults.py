@@ -11,7 +11,7 @@ from fulcrum.scenarios.cli import main
 from fulcrum.sim.evaluation.report import Verdict
 from fulcrum.sim.model.robot import RobotModel
 from fulcrum.sim.motion.schedule import Schedule
-from fulcrum.sim.run.loop import ClosedLoop
+from fulcrum.sim.run.assembly import closed_loop
 from fulcrum.sim.run.notebook import report_markdown
 from fulcrum.sim.scenario.control import Guard
 from fulcrum.sim.signals.event import Mode
@@ -159,7 +159,7 @@ def test_a_harsh_world_in_which_the_grip_suffices_trips_nothing(seed):
     # In seed 2 an arm whose motors are weak sags by 6 deg on its way; it gets there all the same.
     box = scenario("box-tilt")
     firm = replace(box.control, friction_factor=0.6, preload=14.0)
-    loop = ClosedLoop(box, firm, seed=seed, world=draw(preset("harsh"), box, seed))
+    loop = closed_loop(box, firm, seed=seed, world=draw(preset("harsh"), box, seed))
     for _ in loop.run():
         assert loop.events == ()
     assert np.degrees(loop.trace.tilt[-1]) > 89.0
@@ -196,7 +196,7 @@ def test_a_senseless_fault_is_refused_by_name(field, options):
 def test_a_fault_of_a_joint_that_does_not_exist_is_refused():
     fault = Fault(FaultKind.TORQUE_LOST, 1.0, joint="tail")
     with pytest.raises(InvalidInputError, match=r"^fault\.joint: got tail; valid is one of right_"):
-        ClosedLoop(TILT, TILT.control, world=World(faults=(fault,)))
+        closed_loop(TILT, TILT.control, world=World(faults=(fault,)))
 
 
 @pytest.mark.parametrize("value", [0.0, -1.0, np.nan])

@@ -207,7 +207,8 @@ def commanded(pose_filter_s, turn):
     mujoco.mju_quatIntegrate(turned, np.array([0.0, -turn, 0.0]), 1.0)
     rows, none = ((t, quat_WO), (t + T, turned)), np.zeros(len(q))
     return [
-        controller.command(Measurement(at, q, none, p_WO, quat, none)).w_OC_C for at, quat in rows
+        controller.command(Measurement(at, q, none, p_WO, quat, none)).w_commanded_C
+        for at, quat in rows
     ]
 
 

@@ -11,7 +11,7 @@ from fulcrum.scenarios import scenario
 from fulcrum.sim.control.reaction import GripReaction
 from fulcrum.sim.evaluation.monitor import ContactHistory, Monitor
 from fulcrum.sim.planning.path_problems import PathProblems
-from fulcrum.sim.run.loop import ClosedLoop
+from fulcrum.sim.run.assembly import closed_loop
 from fulcrum.sim.scenario.control import controllers
 from fulcrum.sim.signals.setpoint import Setpoint
 from fulcrum.sim.world.world import Push, World
@@ -30,12 +30,12 @@ MU = 0.1 * (1.0 - ROBUST.robustness.uncertainty.friction) * 0.78
 def gripping():
     """A setpoint that squeezes and does nothing else, mass matrix and gravity at a tilt of 0."""
     problem = PathProblems(BOX, BOX.control, joint_path=planned()).problem(0.0)
-    ROBOT.update(planned().holding(0.0))
-    w_OC_C = np.zeros((4, 6))
-    w_OC_C[:2, N] = GRIP_N
+    state = ROBOT.at(planned().holding(0.0))
+    w_commanded_C = np.zeros((4, 6))
+    w_commanded_C[:2, N] = GRIP_N
     J_C = problem.joints.J_C
-    tau_f = w_OC_C[:2].ravel() @ J_C.reshape(12, -1)
-    return Setpoint(tau_f, w_OC_C, J_C), ROBOT.mass_matrix(), ROBOT.gravity()
+    tau_f = w_commanded_C[:2].ravel() @ J_C.reshape(12, -1)
+    return Setpoint(tau_f, w_commanded_C, J_C), state.mass_matrix(), state.tau_g
 
 
 def pull_of(*components):
@@ -133,7 +133,7 @@ def slips_mm(newtons):
     push = Push(t=1.5, duration_s=0.2, force_W=(-8.0, 0.0, 0.0), p_OA_O=(-0.14, 0.09, 0.0))
     control = replace(ROBUST, robustness=replace(ROBUST.robustness, reaction=newtons))
     world = World(friction=(0.7,) * 4, pushes=(push,))
-    loop = ClosedLoop(scene, control, world=world)
+    loop = closed_loop(scene, control, world=world)
     monitor = Monitor(loop.truth)
     history = ContactHistory.concatenate([monitor.update(block) for block in loop.run()])
     return 1e3 * history.slip.max(axis=0)

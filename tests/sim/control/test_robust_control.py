@@ -103,7 +103,7 @@ def gripping(control, squeeze_n):
     """Drives that hold the box flat with a squeeze, the hands' normal rows, and what q is."""
     q = planned().holding(0.0)
     drives = Drives(BOX, control, ROBOT)
-    drives.update_model(q)
+    drives.update_model(ROBOT.at(q))
     problem = PathProblems(BOX, BOX.control, joint_path=planned()).problem(0.0)
     J_C = problem.joints.J_C
     w_OC_C = np.zeros((4, 6))
@@ -128,10 +128,11 @@ def torque_of(drives, q, deviation):
     return off - there
 
 
-def normal_forces(tau, J_n):
+def normal_forces(tau, J_n, q):
     """What torques make of hands that cannot move along their normals."""
-    compliance = J_n @ np.linalg.solve(ROBOT.mass_matrix(), J_n.T)
-    return np.linalg.solve(compliance, J_n @ np.linalg.solve(ROBOT.mass_matrix(), tau))
+    mass_matrix = ROBOT.at(q).mass_matrix()
+    compliance = J_n @ np.linalg.solve(mass_matrix, J_n.T)
+    return np.linalg.solve(compliance, J_n @ np.linalg.solve(mass_matrix, tau))
 
 
 @pytest.mark.parametrize("yielding", [True, False])
@@ -139,11 +140,11 @@ def test_the_impedance_adds_no_squeeze_but_still_resists_a_shift_of_both_hands(y
     control = replace(ROBUST, yielding_squeeze=yielding)
     drives, J_n, q = gripping(control, 40.0)
     drives.torques(seen(q), target(q), 1.0)
-    drives.update_model(q)
+    drives.update_model(ROBOT.at(q))
     push = np.linalg.pinv(J_n)
     # Both hands 0.1 mm off inwards, and both to the same side: their normals are opposed.
-    squeeze = normal_forces(torque_of(drives, q, push @ [1e-4, 1e-4]), J_n)
-    shift = normal_forces(torque_of(drives, q, push @ [1e-4, -1e-4]), J_n)
+    squeeze = normal_forces(torque_of(drives, q, push @ [1e-4, 1e-4]), J_n, q)
+    shift = normal_forces(torque_of(drives, q, push @ [1e-4, -1e-4]), J_n, q)
     if yielding:
         # Along e alone: what the other joints' inertia makes of it is a shift, 50 times less.
         assert abs(squeeze.sum()) < 1e-9

@@ -185,21 +185,23 @@ def test_forces_in_the_world_become_wrenches_in_contact_axes():
     # The box's up axis, the hands' first tangent, at a tilt about -y.
     up = np.stack([-s, 0.0 * s, c], axis=1)
     f_t = up @ force
-    np.testing.assert_allclose(history.w_OC_C[:, LEFT, 0], f_t, rtol=0, atol=10 * ROUNDING)
-    np.testing.assert_allclose(history.w_OC_C[:, RIGHT, 0], f_t, rtol=0, atol=10 * ROUNDING)
+    np.testing.assert_allclose(history.w_measured_C[:, LEFT, 0], f_t, rtol=0, atol=10 * ROUNDING)
+    np.testing.assert_allclose(history.w_measured_C[:, RIGHT, 0], f_t, rtol=0, atol=10 * ROUNDING)
     # The left hand presses along -y, the right one along +y.
-    np.testing.assert_allclose(history.w_OC_C[:, LEFT, 2], 4.0, rtol=0, atol=10 * ROUNDING)
-    np.testing.assert_allclose(history.w_OC_C[:, RIGHT, 2], -4.0, rtol=0, atol=10 * ROUNDING)
+    np.testing.assert_allclose(history.w_measured_C[:, LEFT, 2], 4.0, rtol=0, atol=10 * ROUNDING)
+    np.testing.assert_allclose(history.w_measured_C[:, RIGHT, 2], -4.0, rtol=0, atol=10 * ROUNDING)
     # o = n x t: for the left hand -y x up, which is the box's short way towards -x.
     along = np.stack([c, 0.0 * s, s], axis=1) @ force
-    np.testing.assert_allclose(history.w_OC_C[:, LEFT, 1], -along, rtol=0, atol=10 * ROUNDING)
-    np.testing.assert_allclose(history.w_OC_C[:, RIGHT, 1], along, rtol=0, atol=10 * ROUNDING)
+    np.testing.assert_allclose(history.w_measured_C[:, LEFT, 1], -along, rtol=0, atol=10 * ROUNDING)
+    np.testing.assert_allclose(history.w_measured_C[:, RIGHT, 1], along, rtol=0, atol=10 * ROUNDING)
     # At the edge the axes stay: t = x, o = z x x = y, n = z.
     expected = np.broadcast_to(force, (STEPS, 2, 3))
-    np.testing.assert_allclose(history.w_OC_C[:, 2:, :3], expected, rtol=0, atol=10 * ROUNDING)
+    np.testing.assert_allclose(
+        history.w_measured_C[:, 2:, :3], expected, rtol=0, atol=10 * ROUNDING
+    )
     moments = np.broadcast_to([0.1, 0.2, 0.0, 0.0], (STEPS, 4))
-    np.testing.assert_array_equal(history.w_OC_C[..., 5], moments)
-    np.testing.assert_array_equal(history.w_OC_C[..., 3:5], 0.0)
+    np.testing.assert_array_equal(history.w_measured_C[..., 5], moments)
+    np.testing.assert_array_equal(history.w_measured_C[..., 3:5], 0.0)
 
 
 def test_utilisation_is_of_the_true_friction():

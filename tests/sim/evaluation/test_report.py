@@ -93,8 +93,8 @@ def found_no_forces(trace, history):
 
 
 def followed_badly(trace, history):
-    commanded = trace.w_command_C[:, LEFT, N]
-    return changed(trace, "w_command_C", np.s_[:, LEFT, N], 1.1 * commanded), history
+    commanded = trace.w_commanded_C[:, LEFT, N]
+    return changed(trace, "w_commanded_C", np.s_[:, LEFT, N], 1.1 * commanded), history
 
 
 SENTENCES = {
@@ -137,8 +137,8 @@ def test_a_normal_force_off_its_command_is_told_with_both_numbers(judge, run):
     trace, history = followed_badly(run.trace, run.history)
     (sentence,) = judge.report(INFO, trace, history).failures
     settled = trace.t > 0.5995
-    error = (history.w_OC_C[:, LEFT, N] - trace.w_command_C[:, LEFT, N])[settled]
-    allowed = LIMITS.force_error * trace.w_command_C[:, LEFT, N].max()
+    error = (history.w_measured_C[:, LEFT, N] - trace.w_commanded_C[:, LEFT, N])[settled]
+    allowed = LIMITS.force_error * trace.w_commanded_C[:, LEFT, N].max()
     assert sentence == (
         f"Contact left followed its commanded normal force only to {np.sqrt(np.mean(error**2)):.3g}"
         f" N RMS (allowed {allowed:.3g} N)."
@@ -241,13 +241,13 @@ def test_the_report_s_numbers_are_those_of_the_trace(judge, run):
     assert report.tilt.max_error_deg == np.abs(error).max()
     left = report.contacts["left"]
     assert left.slip_mm == 1e3 * history.slip[settled, LEFT].max()
-    assert left.max_normal_n == history.w_OC_C[settled, LEFT, N].max()
+    assert left.max_normal_n == history.w_measured_C[settled, LEFT, N].max()
     assert report.synthesis.solves == np.count_nonzero(trace.synthesis_s)
     assert report.seed == INFO.seed
     # 2700 steps of 1 ms in the 2 s that INFO says they took.
     assert report.timing.real_time_factor == pytest.approx(1.35, rel=1e-12)
     touching = trace.t < 0.1995
-    assert left.free_normal_n == history.w_OC_C[touching, LEFT, N].max()
+    assert left.free_normal_n == history.w_measured_C[touching, LEFT, N].max()
 
 
 def test_phases_are_named_in_order_with_their_times(judge, run):

@@ -96,14 +96,14 @@ def test_no_tilt_is_printed_as_minus_nothing(judge, run, final):
 
 
 def test_a_hand_that_hits_with_more_than_its_grip_is_told(judge, run):
-    peak = run.trace.w_command_C[:, LEFT, N].max()
-    history = changed(run.history, "w_OC_C", (TOUCH_ROW, LEFT, N), 1.001 * peak)
+    peak = run.trace.w_commanded_C[:, LEFT, N].max()
+    history = changed(run.history, "w_measured_C", (TOUCH_ROW, LEFT, N), 1.001 * peak)
     (sentence,) = judge.report(INFO, run.trace, history).failures
     assert sentence == (
         f"Hand left hit the object with {1.001 * peak:.3g} N at {when(run.trace, TOUCH_ROW)}, "
         f"more than its largest grip of {peak:.3g} N."
     )
-    history = changed(run.history, "w_OC_C", (TOUCH_ROW, LEFT, N), 0.999 * peak)
+    history = changed(run.history, "w_measured_C", (TOUCH_ROW, LEFT, N), 0.999 * peak)
     report = judge.report(INFO, run.trace, history)
     assert report.verdict is Verdict.PASS
     assert report.contacts["left"].free_normal_n == pytest.approx(0.999 * peak, rel=1e-12)
@@ -122,7 +122,7 @@ def test_a_hand_that_touches_when_the_object_should_stand_alone_is_told(run, gap
     if gap:
         expected = f"Hand left touched the object at {when(trace, 2650)}, when it should stand"
         assert told[0].startswith(expected)
-        gone = changed(run.history, "w_OC_C", (slice(2650, None), slice(0, 2), N), 0.0)
+        gone = changed(run.history, "w_measured_C", (slice(2650, None), slice(0, 2), N), 0.0)
         assert not [f for f in alone.report(INFO, trace, gone).failures if "stand alone" in f]
 
 

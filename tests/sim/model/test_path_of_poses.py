@@ -16,7 +16,7 @@ from fulcrum.sim.model.scene import compose
 from fulcrum.sim.motion.schedule import Schedule
 from fulcrum.sim.planning.plan import plan
 from fulcrum.sim.planning.problem import Margins
-from fulcrum.sim.run.loop import ClosedLoop
+from fulcrum.sim.run.assembly import closed_loop
 from fulcrum.sim.scenario.control import controllers
 from fulcrum.sim.scenario.path import Poses
 from fulcrum.sim.world.world import World
@@ -108,7 +108,7 @@ def test_a_run_and_a_plan_through_poses_are_those_of_the_screw():
     poses = replace(screw, path=sampled(screw.path, 0, 2, 6))
     tilts = []
     for chosen in (screw, poses):
-        loop = ClosedLoop(chosen, controllers(chosen.control)["robust"])
+        loop = closed_loop(chosen, controllers(chosen.control)["robust"])
         assert sum(len(block) for block in loop.run()) == loop.steps
         assert not loop.events and not loop.collisions
         tilts.append(loop.trace.tilt)

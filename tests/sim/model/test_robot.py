@@ -85,12 +85,12 @@ def test_baxter_s_limits_are_the_official_ones():
 
 def test_joints_of_a_problem_are_the_belief_s():
     belief = robot("box-tilt")
-    belief.update(sampled_positions(belief, 1)[0])
+    state = belief.at(sampled_positions(belief, 1)[0])
     p_WC, R_WC = sampled_contacts(2)
-    joints = belief.statics(p_WC, R_WC)
+    joints = state.statics(p_WC, R_WC)
     assert joints.names == belief.joints
-    np.testing.assert_array_equal(joints.J_C, belief.contact_jacobians(p_WC, R_WC))
-    np.testing.assert_array_equal(joints.tau_g, belief.gravity())
+    np.testing.assert_array_equal(joints.J_C, state.contact_jacobians(p_WC, R_WC))
+    np.testing.assert_array_equal(joints.tau_g, state.tau_g)
     np.testing.assert_array_equal(joints.tau_min, belief.tau_min)
     np.testing.assert_array_equal(joints.tau_max, belief.tau_max)
 
@@ -117,8 +117,8 @@ def test_jacobian_is_the_derivative_of_the_forward_kinematics(name):
     model, h = plant_model(scene), 1e-5
     q = sampled_positions(belief, 1)[0]
     p_WC, R_WC = sampled_contacts(len(scene.hands))
-    belief.update(q)
-    J_C = belief.contact_jacobians(p_WC, R_WC)
+    state = belief.at(q)
+    J_C = state.contact_jacobians(p_WC, R_WC)
     for j in range(len(belief.joints)):
         step = h * np.eye(len(belief.joints))[j]
         ahead = moved_points(model, belief, scene, q + step, p_WC, q)
@@ -127,7 +127,7 @@ def test_jacobian_is_the_derivative_of_the_forward_kinematics(name):
         # Lever times h^2 / 6 is 4e-11; rounding of 1 m over 2 h is 1e-11.
         np.testing.assert_allclose(J_C[:, :3, j], expected, rtol=0, atol=2e-10)
     # A point a millimetre off is caught.
-    shifted = belief.contact_jacobians(p_WC + np.array([0.0, 0.0, 1e-3]), R_WC)
+    shifted = state.contact_jacobians(p_WC + np.array([0.0, 0.0, 1e-3]), R_WC)
     assert np.abs(shifted - J_C).max() > 5e-4
 
 
@@ -140,8 +140,8 @@ def test_torque_of_a_contact_wrench_is_mujoco_s_and_does_the_same_work(name):
     q, qd = sampled_positions(belief, 1)[0], rng.normal(size=len(belief.joints))
     p_WC, R_WC = sampled_contacts(len(scene.hands))
     wrenches = rng.normal(scale=30.0, size=(len(scene.hands), 6))
-    belief.update(q)
-    joints = belief.statics(p_WC, R_WC)
+    state = belief.at(q)
+    joints = state.statics(p_WC, R_WC)
     tau = np.einsum("nkl,nk->l", joints.J_C, wrenches)
     for i, joint in enumerate(belief.joints):
         data.qpos[model.joint(joint).qposadr[0]] = q[i]

@@ -7,11 +7,11 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from fulcrum.sim.control.replanning import Replanner
 
 from fulcrum.scenarios import scenario
 from fulcrum.scenarios.cli import main
 from fulcrum.scenarios.commands.common import chosen_planning
-from fulcrum.sim.control.replanning import Replanner
 from fulcrum.sim.motion.references import References
 from fulcrum.sim.planning.execution import Planning, planned_tilt
 from fulcrum.sim.run.execute import Request, execute
@@ -47,7 +47,7 @@ def test_a_planned_tilt_is_executed_within_the_bars(name, stretch):
     # Phases begin at ticks.
     assert lasted == pytest.approx(stretch * fastest(name).duration, abs=2 * TICK)
     moving = rows_of(name, result.trace, "tilt")
-    pressed = result.trace.w_command_C[moving, : len(scenario(name).hands), N]
+    pressed = result.trace.w_commanded_C[moving, : len(scenario(name).hands), N]
     # Contacts are made once for every half degree, over which the grip may change.
     off = np.radians(np.linspace(-0.5, 0.5, 21)[:, None]) + result.trace.tilt_ref[moving]
     planned = execution(name, stretch).grip.at(off.ravel()).reshape(21, *pressed.shape)

@@ -42,8 +42,8 @@ def test_the_hands_move_with_the_object_to_1e_6(name):
     for s in np.linspace(0.0, 1.0, 31):
         R_WO, p_WO = path.pose(path.end * s)
         axes = frames.in_world(R_WO)[:hands]
-        robot.update(curve(s))
-        J_C = robot.contact_jacobians(frames.points(R_WO, p_WO)[:hands], axes)
+        state = robot.at(curve(s))
+        J_C = state.contact_jacobians(frames.points(R_WO, p_WO)[:hands], axes)
         for i, (J, R_WC) in enumerate(zip(J_C, axes, strict=True)):
             slope, _ = path.derivatives(path.end * s, frames.p_OC_O[i])
             twist = path.end * np.concatenate([R_WC.T @ slope, R_WC.T @ path.direction])

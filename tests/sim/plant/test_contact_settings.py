@@ -44,8 +44,10 @@ def force_shift(name, first, second):
     """
     steps = min(len(first.trace), len(second.trace))
     R_WC = first.history.R_WC
-    peak = np.abs(forces(name, R_WC, first.trace.w_command_C)).max(axis=0)
-    both = [forces(name, run.history.R_WC, run.history.w_OC_C)[:steps] for run in (first, second)]
+    peak = np.abs(forces(name, R_WC, first.trace.w_commanded_C)).max(axis=0)
+    both = [
+        forces(name, run.history.R_WC, run.history.w_measured_C)[:steps] for run in (first, second)
+    ]
     return (both[1] - both[0]) / peak, settled(name, first.trace)[:steps]
 
 
@@ -57,7 +59,7 @@ def gripped(name, trace):
 
 def by_role(name, outcome):
     """Sums of forces over the hands and over the supports, (k, 2), measured."""
-    normal = forces(name, outcome.history.R_WC, outcome.history.w_OC_C)
+    normal = forces(name, outcome.history.R_WC, outcome.history.w_measured_C)
     hands = len(scenario(name).hands)
     return np.column_stack([normal[:, :hands].sum(axis=1), normal[:, hands:].sum(axis=1)])
 

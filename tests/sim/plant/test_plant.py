@@ -10,7 +10,7 @@ from scipy.spatial.transform import Rotation
 
 from fulcrum.sim.geometry.geom import Geom
 from fulcrum.sim.geometry.pose import Pose
-from fulcrum.sim.plant.mujoco import Plant
+from fulcrum.sim.plant.mujoco import MujocoPlant
 from tests.helpers.plants import (
     BOX,
     FRAMES,
@@ -204,7 +204,7 @@ def standing(geom, support):
         supports=(replace(BOX.supports[0], p_OP_O=support),),
         robots=(replace(BOX.robots[0], posture={}),),
     )
-    plant = Plant(scene)
+    plant = MujocoPlant(scene)
     plant.reset(np.zeros(0))
     for _ in range(300):
         plant.step()
@@ -243,7 +243,7 @@ def with_post(at):
     """The plant at a tilt of 30 deg with a post somewhere [m], in the present contacts."""
     path = replace(BOX.path, start=start_at(30.0))
     post = replace(POST, pose=Pose(tuple(at)))
-    plant = Plant(replace(BOX, path=path, environment=(*BOX.environment, post)))
+    plant = MujocoPlant(replace(BOX, path=path, environment=(*BOX.environment, post)))
     plant.reset(planned().holding(np.radians(30.0)))
     return plant
 

@@ -85,7 +85,9 @@ def test_every_scalar_series_is_the_trace_at_full_rate(content, result):
     expected = {
         "tilt": tilt,
         "tilt_error": tilt[:, 1:] - tilt[:, :1],
-        "normal_force": np.column_stack([trace.w_command_C[..., N], history.w_OC_C[..., N]]),
+        "normal_force": np.column_stack(
+            [trace.w_commanded_C[..., N], history.w_measured_C[..., N]]
+        ),
         "utilisation": np.where(history.kept, history.utilisation, 0.0),
         "slip": 1e3 * history.slip,
     }
@@ -136,7 +138,7 @@ def test_arrows_are_the_forces_to_scale_at_their_contacts(content, result, conta
     i = CONTACTS.index(contact)
     steps = np.arange(0, len(result.trace), POSE_STRIDE)
     rows, R_WC = result.trace.pick(steps), result.history.R_WC[steps]
-    commanded = np.einsum("kij,kj->ki", R_WC[:, i], rows.w_command_C[:, i, :3])
+    commanded = np.einsum("kij,kj->ki", R_WC[:, i], rows.w_commanded_C[:, i, :3])
     for kind, forces in (("measured", rows.f_W[:, i, :3]), ("commanded", commanded)):
         times, vectors = content.series(f"forces/{kind}", "Arrows3D:vectors")
         assert np.abs(times - rows.t).max() < NANOSECOND

@@ -15,8 +15,8 @@ from fulcrum.scenarios import scenario, scenarios
 from fulcrum.sim.model.object_path import ScrewPath
 from fulcrum.sim.model.robot import RobotModel
 from fulcrum.sim.motion.schedule import Schedule
+from fulcrum.sim.run.assembly import closed_loop
 from fulcrum.sim.run.environment import make_environment
-from fulcrum.sim.run.loop import ClosedLoop
 from fulcrum.sim.scenario.phases import Phase
 from fulcrum.synthesis import InvalidInputError
 from tests.helpers.runs import NAMES
@@ -207,10 +207,10 @@ def soon(scene):
 
 
 @cache
-def closed_loop(name):
+def looped(name):
     """The first rows of a closed loop with seed 5."""
     scene = soon(scenario(name))
-    loop = ClosedLoop(scene, scene.control, seed=5)
+    loop = closed_loop(scene, scene.control, seed=5)
     for _ in loop.run():
         if loop.steps >= LOOP_STEPS:
             break
@@ -233,7 +233,7 @@ def replay(name, torques):
 
 @each_scenario
 def test_replaying_a_closed_loop_s_torques_repeats_its_run_bit_for_bit(name):
-    trace = closed_loop(name)
+    trace = looped(name)
     q, poses, forces = replay(name, trace.tau)
     np.testing.assert_array_equal(q, trace.q)
     np.testing.assert_array_equal(poses, np.hstack([trace.p_WO, trace.quat_WO]))
@@ -245,7 +245,7 @@ def test_replaying_a_closed_loop_s_torques_repeats_its_run_bit_for_bit(name):
 
 @each_scenario
 def test_a_replay_with_a_slightly_other_torque_is_caught(name):
-    trace = closed_loop(name)
+    trace = looped(name)
     torques = trace.tau.copy()
     # In one step a nanonewton metre turns a light wrist by some 1e-13 rad.
     torques[10] += 1e-9
@@ -254,7 +254,7 @@ def test_a_replay_with_a_slightly_other_torque_is_caught(name):
 
 @each_scenario
 def test_twist_is_that_before_the_last_physics_step_and_the_pose_that_after(name):
-    trace, dt = closed_loop(name), scenario(name).physics.timestep
+    trace, dt = looped(name), scenario(name).physics.timestep
     environment = make_environment(soon(scenario(name)), 5, control_timestep=dt)
     environment.reset()
     for row, tau in enumerate(trace.tau[:100]):

@@ -13,9 +13,10 @@ from fulcrum.scenarios import scenario
 from fulcrum.scenarios.cli import main
 from fulcrum.sim.evaluation.report import Verdict
 from fulcrum.sim.motion.joint_path import PathError
-from fulcrum.sim.plant.mujoco import Plant
+from fulcrum.sim.plant.mujoco import MujocoPlant
+from fulcrum.sim.plant.protocol import DivergedError
+from fulcrum.sim.run.assembly import closed_loop
 from fulcrum.sim.run.execute import Request, execute, resolved_config
-from fulcrum.sim.run.loop import ClosedLoop, DivergedError
 from fulcrum.sim.run.notebook import report_markdown
 from fulcrum.sim.scenario.phases import stretched
 from tests.helpers.short_run import short_tilt
@@ -163,7 +164,7 @@ def test_a_signal_ends_the_run_after_the_present_block_with_a_complete_record(tm
 
 def blow_up(monkeypatch, step):
     """Makes the plant's state run away in a step, counted from 0."""
-    steps, made = [], Plant.step
+    steps, made = [], MujocoPlant.step
 
     def stepped(plant):
         if len(steps) == step:
@@ -171,7 +172,7 @@ def blow_up(monkeypatch, step):
         steps.append(plant.measure().t)
         made(plant)
 
-    monkeypatch.setattr(Plant, "step", stepped)
+    monkeypatch.setattr(MujocoPlant, "step", stepped)
 
 
 @pytest.mark.parametrize("step", [BLOCK, BLOCK + 50, 2 * BLOCK - 1, 1])
@@ -193,7 +194,7 @@ def test_a_diverged_run_keeps_every_step_before_and_says_when(monkeypatch, tmp_p
 
 def test_the_loop_raises_only_after_it_has_handed_over_the_last_rows(monkeypatch):
     blow_up(monkeypatch, 2 * BLOCK + 50)
-    loop, blocks = ClosedLoop(SCENARIO, SCENARIO.control), []
+    loop, blocks = closed_loop(SCENARIO, SCENARIO.control), []
     with pytest.raises(DivergedError, match=r"diverged at 0\.550 s"):
         for block in loop.run():
             blocks.append(len(block))

@@ -34,26 +34,6 @@ def test_times_are_those_at_which_it_gets_there():
     np.testing.assert_allclose(THERE.at(THERE.times(p))[0], p, rtol=0, atol=1e-14)
 
 
-def test_another_timing_goes_on_from_where_it_begins_at_its_own_rate():
-    rest = np.array([0.3, 0.6, 1.0]), np.array([0.04, 0.5, 0.0])
-    whole = THERE.continued(*rest)
-    t = float(whole.times(0.3))
-    assert t == pytest.approx(math.sqrt(0.3), rel=1e-14)  # as before the change
-    before, after = whole.at(t - 1e-9), whole.at(t + 1e-9)
-    assert before[1] == pytest.approx(2.0 * t, rel=1e-6)
-    assert after[1] == pytest.approx(0.2, rel=1e-6)
-    assert after[0] == pytest.approx(before[0], abs=1e-8)
-    steps = [2.0 * 0.3 / (0.2 + math.sqrt(0.5)), 2.0 * 0.4 / math.sqrt(0.5)]
-    assert whole.duration == pytest.approx(t + sum(steps), rel=1e-12)
-
-
-def test_a_timing_may_be_continued_from_rest_and_more_than_once():
-    once = THERE.continued(np.array([0.3, 1.0]), np.array([0.0, 0.7]))
-    assert float(once.at(float(once.times(0.3)) + 1e-9)[1]) < 1e-6
-    twice = once.continued(np.array([0.6, 1.0]), np.array([0.1, 0.0]))
-    assert float(twice.times(0.6)) == pytest.approx(float(once.times(0.6)), rel=1e-12)
-
-
 @pytest.mark.parametrize(
     ("progress", "squared_rates"),
     [

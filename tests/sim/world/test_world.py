@@ -9,10 +9,12 @@ import pytest
 
 from fulcrum.scenarios import scenario
 from fulcrum.sim.model.scene import compose, hand_body, tip_site
-from fulcrum.sim.plant.mujoco import Plant
+from fulcrum.sim.plant.mujoco import MujocoPlant
+from fulcrum.sim.plant.truth import make_true
 from fulcrum.sim.signals.measurement import Measurement
 from fulcrum.sim.world.motors import Motors
 from fulcrum.sim.world.presets import FIELD, HARSH, LAB, NOMINAL, PRESETS, Uncertainty, draw, preset
+from fulcrum.sim.world.pushes import Pushes
 from fulcrum.sim.world.sensors import Sensors
 from fulcrum.sim.world.world import NO_DEVIATION, Push, World
 from fulcrum.synthesis import InvalidInputError
@@ -45,7 +47,7 @@ def test_each_part_of_the_truth_is_what_the_world_says():
 
 def test_an_object_of_another_size_still_lies_on_its_pivot():
     for scene in (BOX, CYLINDER):
-        plant = Plant(World(size=0.9).truth(scene))
+        plant = MujocoPlant(World(size=0.9).truth(scene))
         point = np.array(scene.path.point_W)
         for support in World(size=0.9).truth(scene).supports:
             p_WC = plant.measure().p_WO + support.p_OP_O
@@ -64,7 +66,7 @@ def test_a_displaced_hand_touches_as_far_from_its_place_as_the_world_says():
     expected = 0.005 * tangent - 0.003 * np.cross(normal, tangent)
     np.testing.assert_allclose(moved, expected, rtol=0, atol=1e-15)
     nominal, model = compose(BOX).compile(), compose(BOX).compile()
-    world.change(BOX, model)
+    make_true(model, BOX, world)
     tips = []
     for scene in (nominal, model):
         data = mujoco.MjData(scene)
@@ -81,7 +83,7 @@ def test_a_displaced_hand_touches_as_far_from_its_place_as_the_world_says():
 def test_links_and_joint_friction_are_changed_where_the_world_says():
     model, nominal = compose(BOX).compile(), compose(BOX).compile()
     factors = tuple(1.0 + 0.01 * i for i in range(JOINTS))
-    World(link_mass=factors, joint_friction=(0.3,) * JOINTS).change(BOX, model)
+    make_true(model, BOX, World(link_mass=factors, joint_friction=(0.3,) * JOINTS))
     for i, factor in enumerate(factors):
         joint = int(model.actuator(i).trnid[0])
         body = model.jnt_bodyid[joint]
@@ -104,7 +106,7 @@ def test_motors_make_gain_times_torque_plus_offset_and_noise_of_the_given_size()
 
 def test_noise_of_the_sensors_has_the_given_size_and_leaves_the_plant_alone():
     world = World(seed=3, position_noise=0.001, orientation_noise=0.01, encoder_noise=1e-4)
-    plant = Plant(BOX, world)
+    plant = MujocoPlant(BOX, world)
     sensors, truth = Sensors(world, plant.joints), plant.measure()
     seen = [sensors.see(plant.measure()) for _ in range(2000)]
     p = np.array([m.p_WO for m in seen])
@@ -124,14 +126,21 @@ def test_sensors_of_a_world_without_noise_hand_on_what_they_get():
     assert seen is given
 
 
+def pushed(pushes, steps):
+    """A plant after steps in which nothing but pushes acts on arms and object."""
+    plant, forces = MujocoPlant(BOX), Pushes(World(pushes=pushes))
+    plant.reset(np.zeros(JOINTS))
+    for _ in range(steps):
+        plant.apply(np.zeros(JOINTS), forces.at(plant.measure().t))
+        plant.step()
+    return plant
+
+
 def test_a_push_moves_the_object_for_as_long_as_it_lasts():
     push = Push(t=0.0, duration_s=0.05, force_W=(0.0, 0.0, 30.0), p_OA_O=(0.0, 0.0, 0.0))
     heights = {}
     for name, pushes in (("pushed", (push,)), ("alone", ())):
-        plant = Plant(BOX, World(pushes=pushes))
-        plant.reset(np.zeros(JOINTS))
-        for _ in range(50):
-            plant.step()
+        plant = pushed(pushes, 50)
         heights[name] = plant.measure().p_WO[2]
     # (30 - 20) N on 20 N lift it by half of 0.5 g t^2.
     rise = 0.5 * 0.5 * 9.81 * 0.05**2
@@ -140,10 +149,7 @@ def test_a_push_moves_the_object_for_as_long_as_it_lasts():
 
 def test_a_push_beside_the_centre_turns_the_object():
     push = Push(t=0.0, duration_s=0.05, force_W=(0.0, 0.0, 30.0), p_OA_O=(0.15, 0.0, 0.0))
-    plant = Plant(BOX, World(pushes=(push,)))
-    plant.reset(np.zeros(JOINTS))
-    for _ in range(20):
-        plant.step()
+    plant = pushed((push,), 20)
     assert plant.measure().quat_WO[2] < -1e-4  # up at +x is about -y
 
 
@@ -203,7 +209,7 @@ def test_contacts_of_the_same_two_surfaces_have_the_same_friction():
     world = draw(HARSH, BOX, 1)
     assert world.friction[2] == world.friction[3]
     assert len(set(world.friction)) == 3
-    Plant(world.truth(BOX), world)  # which refuses anything else
+    MujocoPlant(world.truth(BOX), world)  # which refuses anything else
 
 
 # --- refusals ---
@@ -233,7 +239,7 @@ def test_a_world_of_another_scenario_is_refused():
     with pytest.raises(InvalidInputError, match=r"world\.friction: got 2 values; valid is none or"):
         World(friction=(1.0, 1.0)).truth(BOX)
     with pytest.raises(InvalidInputError, match=r"world\.torque_gain"):
-        World(torque_gain=(1.0,)).change(BOX, compose(BOX).compile())
+        make_true(compose(BOX).compile(), BOX, World(torque_gain=(1.0,)))
 
 
 def test_senseless_ranges_and_unknown_presets_are_refused():

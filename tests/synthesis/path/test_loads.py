@@ -13,7 +13,7 @@ from fulcrum.synthesis.path.problem import PathObjective
 from fulcrum.synthesis.path.solution import InfeasiblePathError
 from fulcrum.synthesis.path.synthesizer import solve_path
 from fulcrum.synthesis.robust.uncertainty_set import UncertaintySet
-from tests.helpers.plans import BOX, MARGINS, fastest
+from tests.helpers.plans import BOX, MARGINS
 
 SET = UncertaintySet(mass=0.2, center=(0.02, 0.0, 0.02), friction=0.2)
 
@@ -21,7 +21,7 @@ SET = UncertaintySet(mass=0.2, center=(0.02, 0.0, 0.02), friction=0.2)
 @pytest.fixture(scope="module")
 def uncertain():
     """The box with nine loads."""
-    return path_problem(scenario(BOX), MARGINS[BOX], 45, SET, curve=fastest(BOX).q)[0]
+    return path_problem(scenario(BOX), MARGINS[BOX], 45, SET)[0]
 
 
 @pytest.fixture(scope="module")
@@ -102,7 +102,7 @@ def test_how_much_friction_a_load_lacks_is_said(uncertain, together):
 def test_a_path_on_fewer_points_is_the_same_path(uncertain):
     points = np.array([0, 11, 22, 33, 44])
     coarse = uncertain.at(points)
-    own = path_problem(scenario(BOX), MARGINS[BOX], 5, SET, curve=fastest(BOX).q)[0]
+    own = path_problem(scenario(BOX), MARGINS[BOX], 5, SET)[0]
     np.testing.assert_allclose(coarse.s, own.s, atol=1e-12)
     np.testing.assert_allclose(coarse.loads[3].w_b_O, own.loads[3].w_b_O, atol=1e-9)
     np.testing.assert_allclose(coarse.rates.slopes, own.rates.slopes, atol=1e-9)
