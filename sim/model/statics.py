@@ -18,6 +18,9 @@ from fulcrum.synthesis.problem import Gravity
 
 # Contacts are made once for each of these steps, over which the least grip changes by 0.2 N [deg].
 _GRIP_STEP_DEG = 0.5
+# Quaternions that are nearer to length 1 are as their source made them: their rotation matrices
+# are off by as much [-].
+_UNIT_LENGTH = 1e-9
 
 
 class Statics:
@@ -58,10 +61,13 @@ class Statics:
 
         Args:
             p_WO: Position of the object [m], (3,).
-            quat_WO: Its orientation, (4,), wxyz.
+            quat_WO: Its orientation, (4,), wxyz; of any length, for trackers round their numbers.
             tilt: Where it should be on the path [rad]: what the least grip depends on.
         """
         row = round(min(max(tilt * self._rows_per_rad, 0.0), len(self._contacts) - 1.0))
+        if abs(quat_WO.dot(quat_WO) - 1.0) > _UNIT_LENGTH:
+            quat_WO = quat_WO.copy()
+            mujoco.mju_normalize4(quat_WO)
         R_WO = np.empty((3, 3))
         mujoco.mju_quat2Mat(R_WO.reshape(9), quat_WO)
         R_OC = self._frames.in_object(R_WO)
