@@ -16,8 +16,10 @@ from fulcrum.synthesis.arrays import Array
 from fulcrum.synthesis.contact import skew
 from fulcrum.synthesis.problem import Gravity
 
-# Contacts are made once for each of these steps, over which the least grip changes by 0.2 N [deg].
+# Contacts are made once for each of these steps, with the largest grip within each [deg].
 _GRIP_STEP_DEG = 0.5
+# Grips that differ by less are the same [N].
+_SAME_GRIP = 1e-4
 # Quaternions that are nearer to length 1 are as their source made them: their rotation matrices
 # are off by as much [-].
 _UNIT_LENGTH = 1e-9
@@ -47,7 +49,12 @@ class Statics:
         self._contacts = [nominal]
         if grip is not None:
             tilts = np.linspace(0.0, end, round(np.degrees(end) / _GRIP_STEP_DEG) + 1)
-            self._contacts = [pressed(nominal, f_n) for f_n in grip.at(tilts)]
+            half = 0.5 * end / (len(tilts) - 1)
+            most = np.array([grip.largest(tilt - half, tilt + half) for tilt in tilts.tolist()])
+            middle = grip.at(tilts)
+            # A difference within the solver's noise is none.
+            rows = np.where(grip.least & (most > middle + _SAME_GRIP), most, middle)
+            self._contacts = [pressed(nominal, f_n) for f_n in rows]
         self._rows_per_rad = (len(self._contacts) - 1) / end
         self._frames = ContactFrames(scenario)
         self._hands = len(scenario.hands)
