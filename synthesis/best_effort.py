@@ -5,8 +5,9 @@ r"""Forces for an infeasible problem: within all limits, as near to equilibrium 
     \text{minimise}\quad \left\| D (G F + w_{ext}) \right\|_2 + \epsilon \max F_n
     \quad\text{subject to (5), (6), (7), (15), (16)}
 
-with D dividing moments by the contacts' largest distance from the object frame, so that force and
-moment count alike, and a small weight on the grip that picks the smallest of equal forces.
+with D dividing moments by the contacts' largest distance from the point B that they are about, so
+that force and moment count alike, and a small weight on the grip that picks the smallest of equal
+forces.
 """
 
 from __future__ import annotations
@@ -34,7 +35,7 @@ class BestEffort:
     Attributes:
         w_OC_C: Wrenches on the object in contact axes [N, N·m], (m, 6).
         tau: Joint torques [N·m or N], (l,).
-        imbalance: What is left of (12), in the object frame [N, N·m], (6,).
+        imbalance: What is left of (12), with moments about B, in the object's axes [N, N·m], (6,).
     """
 
     w_OC_C: Array
@@ -52,7 +53,7 @@ def best_effort(problem: Problem) -> BestEffort:
     problem = replace(problem, objective=Objective.MAX_NORMAL_FORCE)
     form = ConicForm(problem)
     A, b = form.matrices(problem)
-    length = max(float(np.linalg.norm(problem.p_OC_O, axis=1).max()), 1e-3)
+    length = max(float(np.linalg.norm(problem.p_OC_O - problem.p_OB_O, axis=1).max()), 1e-3)
     weights = np.repeat([1.0, 1.0 / length], 3)
     # The equations G F + w = 0 become a cone (t; D (G F + w)), with t as a further column.
     balance = form.equilibrium_rows
@@ -83,5 +84,5 @@ def best_effort(problem: Problem) -> BestEffort:
     return BestEffort(
         w_OC_C=w_OC_C,
         tau=problem.torque(w_OC_C),
-        imbalance=np.einsum("mkj,mj->k", problem.G, w_OC_C) + problem.w_ext_O,
+        imbalance=np.einsum("mkj,mj->k", problem.G, w_OC_C) + problem.w_ext_B,
     )

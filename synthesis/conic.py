@@ -184,7 +184,7 @@ class ConicForm:
         unit = self.force_unit(problem)
         f = self.aux_column
         A[self.equilibrium_rows, :f] = problem.G.take(self._G_entries) * facts.scale
-        b[self.equilibrium_rows] = -problem.w_ext_O
+        b[self.equilibrium_rows] = -problem.w_ext_B
         b[self._bound_rows] = facts.bounds.take(self._bounds)
         if self._needs_torque:
             self._torque_rows(A, b, problem, facts.scale)

@@ -22,11 +22,17 @@ def _on_one_line(given: object) -> str:
 
 
 class UnboundedError(FulcrumError):
-    """The objective improves without limit, so that no optimal solution exists."""
+    """No optimal solution exists: the objective improves as long as forces grow.
 
-    def __init__(self, objective: str) -> None:
+    Attributes:
+        limit: Value that the objective approaches without attaining it; None where it has none.
+    """
+
+    def __init__(self, objective: str, limit: float | None = None) -> None:
+        self.limit = limit
+        to = "" if limit is None else f" towards {limit:.3g} as forces grow"
         super().__init__(
-            f"objective {objective} improves without limit; "
+            f"objective {objective} improves without limit{to}; "
             "give the hand contacts an f_n_max or the joints torque limits."
         )
 

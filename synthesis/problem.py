@@ -17,6 +17,13 @@ from fulcrum.synthesis.errors import InvalidInputError
 _ROTATION_TOLERANCE = 1e-6
 # How near 1 a determinant has to be for the quick proof of a rotation.
 _UNIT_DETERMINANT = 1e-2 * _ROTATION_TOLERANCE
+_ORIGIN = np.zeros(3)
+_ORIGIN.setflags(write=False)
+# Moments are about the object frame's origin up to this distance from the contacts, in units of
+# their spread [-]. On 60 random problems, forces then deviate by up to 1e-8, the solver's own
+# tolerance; about origins farther away by 6e-7 at 250 spreads, by a quarter at 2500, and by all of
+# their size at 25,000. About the middle they keep to 3e-8 at 1e6 m.
+_NEAR = 10.0
 
 
 class Objective(StrEnum):
@@ -112,7 +119,11 @@ class Problem:
         joints: The joints behind the hand contacts; None leaves (15) and (16) out.
         objective: Phi.
         contact_set: What follows from the contacts alone, as arrays; not to be given.
-        G: Grasp maps of all contacts, (m, 6, 6); not to be given.
+        p_OB_O: The point B that the moments of (12) are about, in the object frame [m], (3,): the
+            frame's origin, or the middle of the contacts if the origin is so far away that
+            equations about it lose digits; not to be given.
+        G: Grasp maps of all contacts, with moments about B, (m, 6, 6); not to be given.
+        w_ext_B: The external wrench with its moment about B [N, N·m], (6,); not to be given.
         load: The largest load: external wrench, preload and, if torque counts, gravity [N or N·m];
             not to be given.
 
@@ -127,7 +138,9 @@ class Problem:
     joints: Joints | None = None
     objective: Objective = Objective.MAX_NORMAL_FORCE
     contact_set: ContactSet = field(init=False, repr=False)
+    p_OB_O: Array = field(init=False, repr=False)
     G: Array = field(init=False, repr=False)
+    w_ext_B: Array = field(init=False, repr=False)
     load: float = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
@@ -151,8 +164,26 @@ class Problem:
             raise InvalidInputError("joints", None, f"joints, as objective {self.objective} asks")
         if self.joints is not None:
             self._check_joints(self.joints)
-        object.__setattr__(self, "G", grasp_maps(self.R_OC, self.p_OC_O))
+        self._set_balance()
         object.__setattr__(self, "load", self._load())
+
+    def _set_balance(self) -> None:
+        p_OC_O, w_ext_O = self.p_OC_O, self.w_ext_O
+        low, high = p_OC_O.min(axis=0), p_OC_O.max(axis=0)
+        middle, spread = 0.5 * (low + high), high - low
+        if math.sqrt(middle.dot(middle)) <= _NEAR * math.sqrt(spread.dot(spread)):
+            p_OB_O, p_BC_O = _ORIGIN, p_OC_O
+        else:
+            p_OB_O, p_BC_O = middle, p_OC_O - middle
+        object.__setattr__(self, "p_OB_O", p_OB_O)
+        object.__setattr__(self, "G", grasp_maps(self.R_OC, p_BC_O))
+        object.__setattr__(self, "w_ext_B", self.about_B(w_ext_O))
+
+    def about_B(self, w_O: Array) -> Array:
+        """Wrench in the object frame [N, N·m], (6,), with its moment about B instead."""
+        if not self.p_OB_O.any():
+            return w_O
+        return np.concatenate([w_O[:3], w_O[3:] - np.cross(self.p_OB_O, w_O[:3])])
 
     def _check_rotations(self) -> None:
         squares = _check_finite("R_OC", self.R_OC)
@@ -198,7 +229,7 @@ class Problem:
         return self.contact_set.hands
 
     def _load(self) -> float:
-        load = max(*map(abs, self.w_ext_O.tolist()), self.contact_set.preload)
+        load = max(*map(abs, self.w_ext_B.tolist()), self.contact_set.preload)
         if self.joints is not None and self.objective.needs_joints:
             load = max(load, *map(abs, self.joints.tau_g.tolist()))
         return load

@@ -30,7 +30,8 @@ class Multipliers:
     """Lagrange multipliers by the names of their constraints.
 
     Attributes:
-        equilibrium: nu, (6,): change of the optimal objective per change of ``w_ext_O``.
+        equilibrium: nu, (6,): change of the optimal objective per change of ``w_ext_B``, which is
+            ``w_ext_O`` unless the object frame is far from the contacts.
         cone: y, (m, 6), on transmitted components: an element of the dual friction cone.
         f_n_min: alpha >= 0, (m,).
         f_n_max: beta >= 0, (m,).
@@ -64,7 +65,7 @@ class Multipliers:
 
     def value(self, problem: Problem) -> float:
         """Value of the Lagrangian where it is stationary: the dual objective."""
-        value = self.equilibrium @ problem.w_ext_O
+        value = self.equilibrium @ problem.w_ext_B
         for contact, alpha, beta in zip(problem.contacts, self.f_n_min, self.f_n_max, strict=True):
             value += alpha * contact.f_n_min - (beta * contact.f_n_max if beta else 0.0)
         joints = problem.joints
@@ -181,7 +182,7 @@ class Solution:
 
     def _primal_residual(self) -> float:
         problem, f_n = self.problem, self.w_OC_C[:, N]
-        balance = np.einsum("mkj,mj->k", problem.G, self.w_OC_C) + problem.w_ext_O
+        balance = np.einsum("mkj,mj->k", problem.G, self.w_OC_C) + problem.w_ext_B
         worst = float(np.abs(balance).max())
         worst = max(worst, float(np.abs(self.w_OC_C * (1.0 - _transmitted(problem))).max()))
         for contact, w in zip(problem.contacts, self.w_OC_C, strict=True):

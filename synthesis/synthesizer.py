@@ -7,20 +7,8 @@ infeasible prove (17) so. The attempt also goes without iterative refinement: Cl
 residuals that it computes from the data, whatever the accuracy of its steps. It counts if it is
 ``Solved`` to the full tolerance, balances the object and keeps (16); or if its proof of
 infeasibility holds. On anything else the whole problem is solved, carefully. The friction margin,
-which squeezes until a limit binds, is not attempted.
-
-The friction margin, the smallest largest utilisation :math:`\|f_t\| / f_n` of all contacts, is a
-ratio and so quasi-convex. It is found by Dinkelbach's method for the largest of several ratios
-(Crouzeix, Ferland, Schaible 1985): at the utilisation :math:`s` of the last forces solve
-
-.. math:: \min \lambda \quad \text{s.t. (12), (15), (16), (7)},\quad
-          \|f_{t,i}\| \le s f_{n,i} + \lambda d_i
-
-with :math:`d_i` the last normal forces, starting from :math:`s = d_i = 1` with
-:math:`\lambda \le 0`, which is feasible exactly if (17) is. A negative :math:`\lambda` gives
-forces with a smaller utilisation; none is left when :math:`\lambda = 0`. It converges
-superlinearly, in 4 to 8 solves. An unloaded contact has no utilisation; its :math:`d_i = 0`
-keeps it within the cone at s without letting it hold the others back.
+which squeezes until a limit binds, is not attempted; see
+:mod:`synthesis.friction_margin`.
 """
 
 from __future__ import annotations
@@ -28,25 +16,21 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Callable, Hashable
-from dataclasses import dataclass, replace
 from functools import partial
 from operator import le
 
 import clarabel
 import numpy as np
 import scipy.sparse as sp
-from numpy.typing import NDArray
 
-from fulcrum.synthesis.arrays import Array, N
+from fulcrum.synthesis.arrays import Array
 from fulcrum.synthesis.conic import ConicForm, structure
-from fulcrum.synthesis.contact import ContactModel
 from fulcrum.synthesis.errors import SolverError, UnboundedError
+from fulcrum.synthesis.friction_margin import AS_IT_STANDS, Parameters, largest_margin
 from fulcrum.synthesis.problem import Joints, Objective, Problem
 from fulcrum.synthesis.solution import InfeasibleError, Multipliers, Solution, certificate
 from fulcrum.synthesis.solver import SOLVED, fallback_settings, solver_settings
 
-_MARGIN_TOLERANCE = 1e-9
-_MARGIN_SOLVES = 50
 _PROVEN = ("PrimalInfeasible", "DualInfeasible")
 # The solver's feasibility is relative to its largest number, which may be an absurd bound.
 _WORST_IMBALANCE = 1e-6
@@ -57,8 +41,6 @@ _FARTHEST = 1e4
 # After an attempt that failed, so many problems of the structure are solved with all rows at once:
 # torque limits that bind at one tick bind at the next, and a futile attempt costs a third again.
 _REST = 16
-# Normal forces below this fraction of the largest force count as none: their cones are noise.
-_LOADED = 1e-6
 
 
 class Synthesizer:
@@ -78,11 +60,11 @@ class Synthesizer:
 
         Raises:
             InfeasibleError: No forces satisfy the constraints; carries the certificate.
-            UnboundedError: The objective improves without limit.
+            UnboundedError: The objective improves as long as forces grow.
             SolverError: The solver gave neither.
         """
         if problem.objective is Objective.FRICTION_MARGIN:
-            return _largest_margin(self._solve, problem)
+            return largest_margin(self._solve, problem)
         quick = self._program(self._attempts, problem, careful=False)
         if quick.rest:
             quick.rest -= 1
@@ -91,9 +73,9 @@ class Synthesizer:
             if solution is not None:
                 return solution
             quick.rest = _REST
-        return self._solve(problem, _AS_IT_STANDS)
+        return self._solve(problem, AS_IT_STANDS)
 
-    def _solve(self, problem: Problem, parameters: _Parameters) -> Solution:
+    def _solve(self, problem: Problem, parameters: Parameters) -> Solution:
         """One careful solve; for the friction margin the value is lambda."""
         return self._program(self._programs, problem, careful=True).solve(problem, parameters)
 
@@ -104,17 +86,6 @@ class Synthesizer:
         if program is None:
             program = programs[key] = _Program(problem, careful)
         return program
-
-
-@dataclass(frozen=True)
-class _Parameters:
-    """Parameters of the friction-margin problem: utilisation s [-] and slack scales d, (m,)."""
-
-    s: float = 1.0
-    d: Array | None = None
-
-
-_AS_IT_STANDS = _Parameters()
 
 
 class _Program:
@@ -146,7 +117,7 @@ class _Program:
 
     def attempt(self, problem: Problem) -> Solution | None:
         """Solves without the torque limits; None where that is not the answer to (17)."""
-        parameters = _AS_IT_STANDS
+        parameters = AS_IT_STANDS
         started = time.perf_counter()
         A, b, scale = self._scaled(problem, parameters)
         result = self._update_and_solve(A, b)
@@ -171,7 +142,7 @@ class _Program:
         low, high = joints.tau_min.tolist(), joints.tau_max.tolist()
         return all(map(le, low, given)) and all(map(le, given, high))
 
-    def solve(self, problem: Problem, parameters: _Parameters) -> Solution:
+    def solve(self, problem: Problem, parameters: Parameters) -> Solution:
         """Solves all of (17), with differently set solvers where the prebuilt one stalls."""
         started = time.perf_counter()
         A, b, scale = self._scaled(problem, parameters)
@@ -185,7 +156,7 @@ class _Program:
         return self._solution(problem, result, np.array(result.x), scale, parameters, started)
 
     def _scaled(
-        self, problem: Problem, parameters: _Parameters
+        self, problem: Problem, parameters: Parameters
     ) -> tuple[Array, Array, Array | float]:
         A, b = self.form.matrices(problem, parameters.s, parameters.d)
         if not self.form.has_loose_limits(problem):
@@ -226,7 +197,7 @@ class _Program:
         problem: Problem,
         result: clarabel.DefaultSolution,
         scale: Array | float,
-        parameters: _Parameters,
+        parameters: Parameters,
     ) -> Callable[[], Multipliers]:
         return partial(_unpack, self.form, problem, result.z, scale, parameters.s)
 
@@ -236,7 +207,7 @@ class _Program:
         result: clarabel.DefaultSolution,
         x: Array,
         scale: Array | float,
-        parameters: _Parameters,
+        parameters: Parameters,
         started: float,
     ) -> Solution:
         w_OC_C = self.form.wrenches(problem, x)
@@ -265,42 +236,3 @@ def _unpack(
     form: ConicForm, problem: Problem, z: list[float], scale: Array | float, s: float
 ) -> Multipliers:
     return form.multipliers(problem, np.array(z) * scale, s)
-
-
-def _largest_margin(
-    solve: Callable[[Problem, _Parameters], Solution], problem: Problem
-) -> Solution:
-    """Dinkelbach's method; every iterate is feasible, so that stopping early costs margin only."""
-    unit = problem.load or 1.0
-    best = last = solve(problem, _AS_IT_STANDS)
-    iterations, solve_s = last.iterations, last.solve_s
-    s, loaded = _largest_utilisation(last, unit)
-    for _ in range(_MARGIN_SOLVES):
-        if not loaded.any():
-            break
-        slack = np.where(loaded, last.w_OC_C[:, N], 0.0)
-        try:
-            last = solve(problem, _Parameters(s=s, d=slack))
-        except InfeasibleError:  # At s the cones are left by noise alone.
-            break
-        iterations += last.iterations
-        solve_s += last.solve_s
-        before = loaded
-        ratio, loaded = _largest_utilisation(last, unit)
-        best = replace(last if ratio < s else best, unpack=last.unpack)
-        stalled = ratio > s - _MARGIN_TOLERANCE and (loaded == before).all()
-        if stalled or last.value > -_MARGIN_TOLERANCE:
-            break
-        s = min(s, ratio)
-    else:
-        raise SolverError(f"no convergence of the friction margin in {_MARGIN_SOLVES} solves")
-    value, _ = _largest_utilisation(best, unit)
-    return replace(best, value=value, iterations=iterations, solve_s=solve_s)
-
-
-def _largest_utilisation(solution: Solution, unit: float) -> tuple[float, NDArray[np.bool_]]:
-    """The largest utilisation of the loaded contacts with friction, and which they are, (m,)."""
-    f_n = solution.w_OC_C[:, N]
-    loaded = f_n > _LOADED * max(unit, f_n.max())
-    loaded &= [c.model is not ContactModel.FRICTIONLESS for c in solution.problem.contacts]
-    return float(solution.utilisation[loaded].max(initial=0.0)), loaded

@@ -12,7 +12,7 @@ import numpy as np
 
 from fulcrum.synthesis.arrays import Array
 
-# Lengths this near to 1 are 1.
+# Lengths this near to 1 are 1, and this near to 0 are 0.
 _ROUNDING = 1e-15
 
 
@@ -50,9 +50,11 @@ def inverse(q: Array) -> Array:
 
 
 def normalized(q: Array) -> Array:
-    """Return a quaternion of the same direction and length 1, (4,)."""
+    """Return a quaternion of the same direction and length 1, (4,); no turn if it has none."""
     w, x, y, z = q.tolist()
     length = math.sqrt(w * w + x * x + y * y + z * z)
+    if length < _ROUNDING:
+        return np.array([1.0, 0.0, 0.0, 0.0])
     return q if abs(length - 1.0) <= _ROUNDING else q * (1.0 / length)
 
 

@@ -18,16 +18,24 @@ class GripSchedule:
         tilts: Grid [rad], (k,), rising.
         f_n: Normal forces [N], (k, n).
         shares: Of the robustness asked for that they give [-], (k,); 1 is all of it.
+        least: Whether less is too little, so that a step over the tilt takes the largest within it.
     """
 
     tilts: Array
     f_n: Array
     shares: Array
+    least: bool = False
 
     def at(self, tilts: Array) -> Array:
         """Normal forces at tilts [rad], (j,) -> (j, n); beyond the ends those at the ends."""
         columns = [np.interp(tilts, self.tilts, f_n) for f_n in self.f_n.T]
         return np.stack(columns, axis=-1)
+
+    def largest(self, start: float, stop: float) -> Array:
+        """Largest normal force of each hand between two tilts [rad], (n,)."""
+        within = self.f_n[(start < self.tilts) & (self.tilts < stop)]
+        ends: Array = self.at(np.array([start, stop]))
+        return np.concatenate([ends, within]).max(axis=0)
 
 
 def pressed(contacts: tuple[Contact, ...], f_n: Array) -> tuple[Contact, ...]:

@@ -16,8 +16,13 @@ from fulcrum.synthesis.arrays import Array
 from fulcrum.synthesis.contact import skew
 from fulcrum.synthesis.problem import Gravity
 
-# Contacts are made once for each of these steps, over which the least grip changes by 0.2 N [deg].
+# Contacts are made once for each of these steps, with the largest grip within each [deg].
 _GRIP_STEP_DEG = 0.5
+# Grips that differ by less are the same [N].
+_SAME_GRIP = 1e-4
+# Quaternions that are nearer to length 1 are as their source made them: their rotation matrices
+# are off by as much [-].
+_UNIT_LENGTH = 1e-9
 
 
 class Statics:
@@ -41,7 +46,12 @@ class Statics:
         self._contacts = [nominal]
         if grip is not None:
             tilts = np.linspace(0.0, end, round(np.degrees(end) / _GRIP_STEP_DEG) + 1)
-            self._contacts = [pressed(nominal, f_n) for f_n in grip.at(tilts)]
+            half = 0.5 * end / (len(tilts) - 1)
+            most = np.array([grip.largest(tilt - half, tilt + half) for tilt in tilts.tolist()])
+            middle = grip.at(tilts)
+            # A difference within the solver's noise is none.
+            rows = np.where(grip.least & (most > middle + _SAME_GRIP), most, middle)
+            self._contacts = [pressed(nominal, f_n) for f_n in rows]
         self._rows_per_rad = (len(self._contacts) - 1) / end
         self._frames = ContactFrames(scenario)
         self._hands = len(scenario.hands)
@@ -58,10 +68,12 @@ class Statics:
         Args:
             robot: The robots at their joint angles; without them the problem has no joints.
             p_WO: Position of the object [m], (3,).
-            quat_WO: Its orientation, (4,), wxyz.
+            quat_WO: Its orientation, (4,), wxyz; of any length, for trackers round their numbers.
             tilt: Where it should be on the path [rad]: what the least grip depends on.
         """
         row = round(min(max(tilt * self._rows_per_rad, 0.0), len(self._contacts) - 1.0))
+        if abs(quat_WO.dot(quat_WO) - 1.0) > _UNIT_LENGTH:
+            quat_WO = quaternion.normalized(quat_WO)
         R_WO = quaternion.matrix(quat_WO)
         R_OC = self._frames.in_object(R_WO)
         p_WC = self._frames.points(R_WO, p_WO)

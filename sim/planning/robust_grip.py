@@ -7,7 +7,9 @@ counts.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
+from itertools import pairwise
 
 import numpy as np
 
@@ -23,10 +25,15 @@ from fulcrum.synthesis.problem import Gravity, Problem
 from fulcrum.synthesis.robust.grip import robust_grip
 from fulcrum.synthesis.robust.scaling import Scaling, largest_scaling
 
-# Between these steps grip is interpolated; it bends by less than 1 % of its peak in one [deg].
-_STEP_DEG = 5.0
+# The grid's coarsest and finest step. Half of the finest is half of what one contact set of
+# :mod:`fulcrum.sim.model.statics` stands for [deg].
+_STEP_DEG, _FINEST_DEG = 5.0, 0.3
+# How much less than the grip computed half way the interpolated one may be, and how much more [N].
+_SHORT, _OVER = 0.05, 0.5
 # Shares are found to within two to the power of minus this.
 _HALVINGS = 4
+# Tilt [deg], normal forces of the hands [N], (n,), and the share of the robustness that they give.
+_Point = tuple[float, Array, float]
 
 
 def plan_grip(
@@ -54,16 +61,39 @@ def plan_grip(
     if control.robustness is None:
         return None
     problems = _true_problems(scenario, control, joint_path, robot)
-    tilts_deg = problems.tilts(_STEP_DEG)
-    found = [
-        _grip(problems.problem(tilt), problems.gravity(tilt), control, best_effort)
-        for tilt in tilts_deg.tolist()
-    ]
-    return GripSchedule(
-        tilts=np.radians(tilts_deg),
-        f_n=np.array([f_n for f_n, _ in found]),
-        shares=np.array([share for _, share in found]),
-    )
+
+    def at(tilt_deg: float, share: float | None = None) -> _Point:
+        problem, gravity = problems.problem(tilt_deg), problems.gravity(tilt_deg)
+        if share is not None:
+            try:
+                return tilt_deg, _serving(problem, gravity, control, share), share
+            except (RobustInfeasibleError, SolverError):
+                pass
+        return tilt_deg, *_grip(problem, gravity, control, best_effort)
+
+    coarse = [at(tilt) for tilt in problems.tilts(_STEP_DEG).tolist()]
+    points = [coarse[0]]
+    for before, after in pairwise(coarse):
+        points += [*_between(at, before, after), after]
+    tilts_deg, f_n, shares = zip(*points, strict=True)
+    return GripSchedule(np.radians(tilts_deg), np.array(f_n), np.array(shares), least=True)
+
+
+def _between(at: Callable[[float, float], _Point], before: _Point, after: _Point) -> list[_Point]:
+    """Points to add between two, so that interpolation keeps to what is computed half way.
+
+    What is computed there is the grip for the smaller share of the two, if there is one: shares are
+    steps of a bisection, and between two of them grip jumps.
+    """
+    if after[0] - before[0] < 2.0 * _FINEST_DEG:
+        return []
+    share = min(before[2], after[2])
+    middle = at(0.5 * (before[0] + after[0]), share)
+    lacking = middle[1] - 0.5 * (before[1] + after[1])
+    smooth = lacking.max() <= _SHORT and (lacking.min() >= -_OVER or before[2] != after[2])
+    if smooth and middle[2] >= share:
+        return []
+    return [*_between(at, before, middle), middle, *_between(at, middle, after)]
 
 
 def borne(
@@ -103,19 +133,28 @@ def _true_problems(
     return PathProblems(scenario, full, joint_path=joint_path, robot=robot)
 
 
+def _serving(problem: Problem, gravity: Gravity, control: Control, share: float) -> Array:
+    """Normal forces of the hands [N], (n,), that give a share of the robustness.
+
+    Raises:
+        RobustInfeasibleError: None do.
+        SolverError: The solver gave neither forces nor a proof.
+    """
+    assert control.robustness is not None
+    least, robustness = problem.contact_set.preload, control.robustness
+    preload = max(least, least + share * (robustness.preload - least))
+    hands = np.full(len(problem.hands), preload)
+    squeezed = replace(problem, contacts=pressed(problem.contacts, hands))
+    return robust_grip(robustness.uncertainty.scaled(share).worlds(squeezed, gravity)).f_n
+
+
 def _grip(
     problem: Problem, gravity: Gravity, control: Control, best_effort: bool
 ) -> tuple[Array, float]:
     """Normal forces of the hands [N], (n,), and the share of the robustness that they give."""
-    assert control.robustness is not None
-    robustness = control.robustness
 
     def serving(share: float) -> Array:
-        least = problem.contact_set.preload
-        preload = max(least, least + share * (robustness.preload - least))
-        hands = np.full(len(problem.hands), preload)
-        squeezed = replace(problem, contacts=pressed(problem.contacts, hands))
-        return robust_grip(robustness.uncertainty.scaled(share).worlds(squeezed, gravity)).f_n
+        return _serving(problem, gravity, control, share)
 
     try:
         return serving(1.0), 1.0

@@ -86,7 +86,7 @@ def conflict(certificate: Certificate, gravity: Gravity, R_WO: Array) -> Conflic
     problem, multipliers = certificate.problem, certificate.multipliers
     arm = float(np.linalg.norm(problem.p_OC_O - gravity.center_O, axis=1).max()) or 1.0
     nu_f, nu_m = multipliers.equilibrium[:3], multipliers.equilibrium[3:]
-    nu_f = nu_f + np.cross(nu_m, gravity.center_O)
+    nu_f = nu_f + np.cross(nu_m, gravity.center_O - problem.p_OB_O)
     motion = np.abs(np.concatenate([R_WO @ nu_f, arm * (R_WO @ nu_m)]))
     asked, given = _work(certificate)
     demand = sum(asked.values())
@@ -181,7 +181,7 @@ def _levers(problem: Problem, arm: float) -> dict[str, float]:
 def _work(certificate: Certificate) -> tuple[dict[str, float], dict[str, float]]:
     """The terms of the certificate's value: work asked for, and work that limits can give."""
     problem, multipliers = certificate.problem, certificate.multipliers
-    terms = {"the weight": float(multipliers.equilibrium @ problem.w_ext_O)}
+    terms = {"the weight": float(multipliers.equilibrium @ problem.w_ext_B)}
     for contact, alpha, beta in zip(
         problem.contacts, multipliers.f_n_min, multipliers.f_n_max, strict=True
     ):

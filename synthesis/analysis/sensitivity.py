@@ -88,7 +88,7 @@ def sensitivities(solution: Solution, gravity: Gravity) -> Sensitivities:
     contacts, joints = problem.contacts, problem.joints
     scale = _scale(solution)
     nu = scale * multipliers.equilibrium
-    g, c = gravity.direction_O, gravity.center_O
+    g, c = gravity.direction_O, gravity.center_O - problem.p_OB_O
     center = gravity.weight * np.cross(g, nu[3:])
     y_n, f_n = scale * multipliers.cone[:, N], solution.w_OC_C[:, N]
     by_tau_max, by_tau_min = -scale * multipliers.tau_max, scale * multipliers.tau_min

@@ -112,8 +112,8 @@ class _Balance:
         self._G = np.stack([p.G for p in load.problems])[point]
         self._G = self._G.transpose(0, 2, 1, 3).reshape(len(point), 6, -1)
         a, b = motion[:, :, None]
-        w_ext = np.stack([p.w_ext_O for p in load.problems])[point]
-        self._w_rest = w_ext - load.w_a_O[point] * a - load.w_b_O[point] * b
+        w_ext = np.stack([p.w_ext_B for p in load.problems])[point]
+        self._w_rest = w_ext - load.w_a_B[point] * a - load.w_b_B[point] * b
         self._unit = max(p.load for p in load.problems) or 1.0
 
     def restored(self, w_OC_C: Array) -> Array:

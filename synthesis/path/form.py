@@ -167,7 +167,7 @@ class PathForm:
             balance = form.equilibrium_rows
             rows = self.rows.new(b[point][:, balance], s, [""] * 6)
             self.rows.add_block(A[point][:, balance], rows, columns)
-            self._add_motion(rows, -load.w_a_O[point] / self.unit, -load.w_b_O[point] / self.unit)
+            self._add_motion(rows, -load.w_a_B[point] / self.unit, -load.w_b_B[point] / self.unit)
         if self._effort:
             for block, u in zip(self._blocks, self._u, strict=True):
                 self._utilisations(block, u)

@@ -8,7 +8,7 @@ The path coordinate s runs over a grid :math:`s_0 < \dots < s_N`; its timing is
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from enum import StrEnum
 
 import numpy as np
@@ -62,6 +62,7 @@ class Load:
         problems: (17) at rest, at each of the K grid points; their objectives do not count.
         w_a_O, w_b_O: The wrench that accelerates the object, in its frame, is
             :math:`w_a a + w_b b` [N, N·m], (K, 6).
+        w_a_B, w_b_B: The same about the point B of each problem; not to be given.
 
     Raises:
         InvalidInputError: Shapes differ, or the problems are not of one structure.
@@ -70,6 +71,8 @@ class Load:
     problems: tuple[Problem, ...]
     w_a_O: Array
     w_b_O: Array
+    w_a_B: Array = field(init=False, repr=False)
+    w_b_B: Array = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
         points = len(self.problems)
@@ -77,6 +80,9 @@ class Load:
             raise InvalidInputError("load.problems", "none", "one for every grid point")
         check_array("load.w_a_O", self.w_a_O, (points, 6))
         check_array("load.w_b_O", self.w_b_O, (points, 6))
+        for name, w_O in (("w_a_B", self.w_a_O), ("w_b_B", self.w_b_O)):
+            pairs = zip(self.problems, w_O, strict=True)
+            object.__setattr__(self, name, np.array([p.about_B(w) for p, w in pairs]))
         first = self.problems[0]
         for k, problem in enumerate(self.problems):
             same = problem.contacts == first.contacts
@@ -297,6 +303,6 @@ class PathProblem:
             if (bound := float(np.trapezoid(fastest, self.s))) > 0.0:
                 return bound
         load = self.loads[0]
-        inertia = np.linalg.norm(load.w_a_O, axis=1).max() * (self.s[-1] - self.s[0])
+        inertia = np.linalg.norm(load.w_a_B, axis=1).max() * (self.s[-1] - self.s[0])
         weight = max(problem.load for problem in load.problems)
         return math.sqrt(inertia / weight) if inertia > 0.0 and weight > 0.0 else 1.0

@@ -174,9 +174,9 @@ class PathSolution:
         point, worst = self.problem.stations[:, 0], 0.0
         for load, w_OC_C in zip(self.problem.loads, self.w_OC_C, strict=True):
             G = np.stack([load.problems[k].G for k in point])
-            w_ext = np.stack([load.problems[k].w_ext_O for k in point])
+            w_ext = np.stack([load.problems[k].w_ext_B for k in point])
             balance = np.einsum("smkj,smj->sk", G, w_OC_C) + w_ext
-            balance -= load.w_a_O[point] * a[:, None] + load.w_b_O[point] * b[:, None]
+            balance -= load.w_a_B[point] * a[:, None] + load.w_b_B[point] * b[:, None]
             unit = max(problem.load for problem in load.problems) or 1.0
             worst = max(worst, float(np.abs(balance).max()) / unit)
         return worst

@@ -245,7 +245,7 @@ class _Program:
 def _violation(problem: Problem, w_OC_C: Array, tau: Array, f_n: Array) -> float:
     """Largest violation of (5), (6), (7), (12), (16) or of the common f_n [N, N·m]."""
     facts, normals = problem.contact_set, w_OC_C[:, N]
-    balance = np.einsum("mkj,mj->k", problem.G, w_OC_C) + problem.w_ext_O
+    balance = np.einsum("mkj,mj->k", problem.G, w_OC_C) + problem.w_ext_B
     cones = np.linalg.norm(w_OC_C * facts.friction, axis=1) - normals
     violations = [
         np.abs(balance),

@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from fulcrum.synthesis import InfeasibleError, Objective, Synthesizer
-from fulcrum.synthesis.synthesizer import _AS_IT_STANDS, _REST
+from fulcrum.synthesis.friction_margin import AS_IT_STANDS
+from fulcrum.synthesis.synthesizer import _REST
 from tests.helpers.problems import arms, box, random_feasible, random_infeasible
 
 OBJECTIVES = [o for o in Objective if o is not Objective.FRICTION_MARGIN]
@@ -26,7 +27,7 @@ def binding(objective):
 
 def careful(problem):
     """The solution with all rows at once."""
-    return Synthesizer()._solve(problem, _AS_IT_STANDS)
+    return Synthesizer()._solve(problem, AS_IT_STANDS)
 
 
 # A torque utilisation below 1 keeps all limits.

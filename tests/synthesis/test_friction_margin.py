@@ -8,6 +8,7 @@ import pytest
 from fulcrum.synthesis import (
     Contact,
     ContactModel,
+    InfeasibleError,
     Objective,
     Problem,
     Role,
@@ -15,6 +16,7 @@ from fulcrum.synthesis import (
     UnboundedError,
 )
 from fulcrum.synthesis.contact import utilisation
+from tests.helpers.margins import least_utilisation, margins, palms, slope, squeezable
 from tests.helpers.problems import (
     arms,
     box,
@@ -92,6 +94,77 @@ def test_unlimited_squeeze_makes_the_margin_unbounded():
     problem = replace(box(0.0, environment=False), objective=Objective.FRICTION_MARGIN)
     with pytest.raises(UnboundedError, match="f_n_max"):
         SYNTHESIZER.solve(problem)
+
+
+# --- squeezes without limit: where finite forces attain the optimum, and where none do ---
+
+
+@pytest.mark.parametrize("seed", range(300))
+def test_the_margin_of_unlimited_squeezes_is_the_reference_s(seed):
+    problem = squeezable(seed)
+    expected, solution = margins()[str(seed)], SYNTHESIZER.solve(problem)
+    # The reference's last interval is 1e-9 wide, but its proofs next to the optimum are worth 1e-7.
+    assert solution.value == pytest.approx(expected, abs=1e-6)
+    assert solution.utilisation[forces(solution) > 1e-5].max(initial=0.0) < expected + 1e-6
+    residuals = solution.residuals
+    assert residuals.primal < 1e-6 * problem.load
+    assert residuals.dual < 1e-5
+    assert residuals.gap < 1e-6
+
+
+@pytest.mark.parametrize("seed", [5, 15, 20, 262, 299])
+def test_the_stored_margins_are_what_the_reference_finds(seed):
+    expected = least_utilisation(squeezable(seed))
+    assert margins()[str(seed)] == pytest.approx(expected, abs=1e-6)
+
+
+def test_a_hand_that_is_better_unloaded_is_unloaded():
+    solution = SYNTHESIZER.solve(slope(-50.0))
+    # On the slope alone: tan 10 deg of friction at every point. Any push down the slope adds to it.
+    assert solution.value == pytest.approx(np.tan(np.radians(10.0)), abs=1e-6)
+    assert forces(solution)[0] < 1e-6
+
+
+def test_a_hand_that_pushes_up_the_slope_needs_no_friction_at_all():
+    solution = SYNTHESIZER.solve(slope(50.0))
+    assert solution.value == pytest.approx(0.0, abs=1e-6)
+    assert solution.residuals.primal < 1e-6 * 20.0
+    assert forces(solution).max() < 3.0
+
+
+def test_a_margin_that_no_finite_forces_attain_says_what_it_tends_to():
+    # Palms that open downwards by an angle lift the box by friction alone: half the weight each
+    # takes a utilisation of (tan(angle) + W / (2 f_n cos(angle))) / mu.
+    for angle in (0.05, 0.0):
+        with pytest.raises(UnboundedError) as caught:
+            SYNTHESIZER.solve(palms(angle))
+        # At 1e4 times the load the search ends: W / (2 f_n mu) is 1e-4.
+        assert caught.value.limit == pytest.approx(np.tan(angle) / 0.5, abs=2e-4)
+
+
+def test_a_limit_of_force_makes_such_a_margin_attained():
+    problem = palms(0.05)
+    limited = tuple(replace(c, f_n_max=100.0) for c in problem.contacts)
+    expected = (np.tan(0.05) + 20.0 / (200.0 * np.cos(0.05))) / 0.5
+    value = SYNTHESIZER.solve(replace(problem, contacts=limited)).value
+    assert value == pytest.approx(expected, abs=1e-6)
+
+
+def test_palms_that_open_upwards_need_no_friction():
+    assert SYNTHESIZER.solve(palms(-0.3)).value == pytest.approx(0.0, abs=1e-6)
+
+
+def test_without_any_forces_the_margin_is_infeasible_however_far_one_may_squeeze():
+    # Nothing resists a turn about the line between two points.
+    problem = replace(palms(0.05), w_ext_O=10.0 * np.eye(6)[3])
+    with pytest.raises(InfeasibleError) as caught:
+        SYNTHESIZER.solve(problem)
+    assert caught.value.certificate.residual < 1e-6
+
+
+def forces(solution):
+    """Normal forces over the load [-], (m,)."""
+    return solution.w_OC_C[:, 2] / solution.problem.load
 
 
 # --- duals ---

@@ -262,3 +262,28 @@ def test_a_problem_is_that_of_the_robot_s_state_whatever_came_before(name):
 def test_a_tilt_beyond_the_path_has_no_problem():
     with pytest.raises(InvalidInputError, match=r"^tilt: got 95.0; valid is from 0 to 90 deg"):
         PathProblems(BOX, PAPER).problem(95.0)
+
+
+# --- what a tracker hands over ---
+
+
+@pytest.mark.parametrize("tilt_deg", [0.0, 33.3, 88.0])
+@pytest.mark.parametrize("change", [lambda q: np.round(q, 6), lambda q: 1.2 * q, lambda q: -q])
+def test_a_measured_orientation_need_not_be_of_length_one(tilt_deg, change):
+    R_WO, p_WO = ScrewPath(BOX.path).pose(np.radians(tilt_deg))
+    quaternion = Rotation.from_matrix(R_WO).as_quat(scalar_first=True)
+    statics = Statics(BOX, PAPER)
+    asked, given = (statics.problem(None, p_WO, q) for q in (quaternion, change(quaternion)))
+    # Half of the last digit of a rounded quaternion, in four numbers.
+    np.testing.assert_allclose(given.R_OC, asked.R_OC, atol=4e-6)
+    np.testing.assert_allclose(given.w_ext_O, asked.w_ext_O, atol=4e-6 * 20.0)
+
+
+def test_no_finite_orientation_is_refused():
+    statics = Statics(BOX, PAPER)
+    rng = np.random.default_rng(0)
+    for size in 10.0 ** np.linspace(-160.0, 3.0, 100):
+        statics.problem(None, np.zeros(3), size * rng.normal(size=4))
+    # What cannot be a pose still is.
+    with pytest.raises(InvalidInputError):
+        statics.problem(None, np.zeros(3), np.full(4, np.nan))
