@@ -52,9 +52,6 @@ class Plan(Chosen):
     tip_acceleration: float = math.inf
     """Largest acceleration of the hands' contacts [m/s^2]."""
 
-    force_rate: float | None = None
-    """Largest rate of every contact force, in contact axes [N/s]; without limit if left out."""
-
     robust: bool = False
     """The plan also serves the uncertainty set of controller robust, or as much as it can."""
 
@@ -113,7 +110,6 @@ class Plan(Chosen):
             grip_max=self.grip_max,
             tip_speed=self.tip_speed,
             tip_acceleration=self.tip_acceleration,
-            force_rate=self.force_rate,
         )
 
 
