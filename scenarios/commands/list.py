@@ -10,7 +10,7 @@ from fulcrum.scenarios.commands.common import (
 
 
 @dataclass(frozen=True)
-class List:
+class ListCommand:
     """List the scenarios, and the controllers and objectives to run them with."""
 
     def execute(self) -> int:

@@ -12,7 +12,7 @@ from fulcrum.scenarios.commands.common import FAILED, PASSED, Chosen, asked_plan
 if TYPE_CHECKING:
     from rich.console import Console
 
-    from fulcrum.sim.planning.plan import Plan as Planned
+    from fulcrum.sim.planning.plan import Plan
     from fulcrum.sim.planning.problem import Margins
     from fulcrum.sim.scenario.scenario import Scenario
 
@@ -22,7 +22,7 @@ _LISTED = 0.5
 
 
 @dataclass(frozen=True)
-class Plan(Chosen):
+class PlanCommand(Chosen):
     """Plan the fastest, easiest or safest tilt, with the forces along it; draw and write it."""
 
     objective: str = "least-time"
@@ -113,7 +113,7 @@ class Plan(Chosen):
         )
 
 
-def _print(console: Console, planned: Planned) -> None:
+def _print(console: Console, planned: Plan) -> None:
     import numpy as np
     from rich.box import SIMPLE
     from rich.markup import escape

@@ -9,7 +9,7 @@ import numpy as np
 from fulcrum.sim.analysis.explain import Explanation, explain
 from fulcrum.sim.analysis.surroundings import Surroundings, surroundings
 from fulcrum.sim.model.grip import GripSchedule
-from fulcrum.sim.model.robot import RobotModel
+from fulcrum.sim.model.robot_model import RobotModel
 from fulcrum.sim.motion.ik import plan_joints
 from fulcrum.sim.motion.joint_path import JointPath, PathError
 from fulcrum.sim.planning.path_problems import PathProblems

@@ -10,9 +10,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from fulcrum.sim.geometry.pose import Quaternion, Vector
+from fulcrum.sim.geometry.pose import Quaternion
 from fulcrum.synthesis import InvalidInputError
-from fulcrum.synthesis.arrays import Array
+from fulcrum.synthesis.arrays import Array, Vector
 from fulcrum.synthesis.checks import length, positive, vector
 
 if TYPE_CHECKING:

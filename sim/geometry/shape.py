@@ -9,9 +9,9 @@ import numpy as np
 
 from fulcrum.sim.geometry.geom import Geom
 from fulcrum.sim.geometry.object import Object
-from fulcrum.sim.geometry.pose import Quaternion, Vector, triple
+from fulcrum.sim.geometry.pose import Quaternion, triple
 from fulcrum.synthesis import InvalidInputError
-from fulcrum.synthesis.arrays import Array
+from fulcrum.synthesis.arrays import Array, Vector
 from fulcrum.synthesis.checks import positive, vector
 
 Color: TypeAlias = tuple[float, float, float, float]

@@ -7,12 +7,11 @@ import math
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from fulcrum.sim.geometry.pose import Vector
 from fulcrum.sim.scenario.contacts import Friction
 from fulcrum.sim.scenario.control import Control
 from fulcrum.sim.scenario.scenario import Scenario
 from fulcrum.synthesis import Contact, ContactModel, Role
-from fulcrum.synthesis.arrays import Array
+from fulcrum.synthesis.arrays import Array, Vector
 
 
 def contacts(scenario: Scenario, control: Control) -> tuple[Contact, ...]:

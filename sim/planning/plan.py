@@ -13,11 +13,10 @@ from scipy.interpolate import BSpline
 from fulcrum.sim.planning.problem import CERTAIN, Margins, path_problem
 from fulcrum.sim.scenario.scenario import Scenario
 from fulcrum.synthesis import FulcrumError, InvalidInputError
-from fulcrum.synthesis.arrays import Array
+from fulcrum.synthesis.arrays import Array, Indices
 from fulcrum.synthesis.checks import positive
 from fulcrum.synthesis.path.loads import solve_many
 from fulcrum.synthesis.path.problem import PathObjective, PathProblem
-from fulcrum.synthesis.path.rows import Indices
 from fulcrum.synthesis.path.solution import InfeasiblePathError, PathSolution
 from fulcrum.synthesis.robust.uncertainty_set import UncertaintySet
 

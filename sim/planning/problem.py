@@ -14,7 +14,7 @@ from fulcrum.sim.geometry.object import Object
 from fulcrum.sim.model.contacts import contacts
 from fulcrum.sim.model.inertia import inertial_wrenches
 from fulcrum.sim.model.object_path import ObjectPath, object_path
-from fulcrum.sim.model.robot import RobotModel
+from fulcrum.sim.model.robot_model import RobotModel
 from fulcrum.sim.model.statics import Statics, gravity
 from fulcrum.sim.motion.ik import plan_joints
 from fulcrum.sim.motion.joint_path import JointPath

@@ -12,7 +12,7 @@ from fulcrum.sim.control.replanning import Replanner
 from fulcrum.sim.model.contacts import ContactFrames
 from fulcrum.sim.model.grip import GripSchedule
 from fulcrum.sim.model.object_path import object_path
-from fulcrum.sim.model.robot import RobotModel
+from fulcrum.sim.model.robot_model import RobotModel
 from fulcrum.sim.motion.ik import plan_joints
 from fulcrum.sim.motion.joint_path import JointPath
 from fulcrum.sim.planning.robust_grip import plan_grip

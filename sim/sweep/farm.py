@@ -33,7 +33,7 @@ _SETTINGS = {
 }
 
 # Called with episodes finished, episodes in total and failures so far.
-Progress = Callable[[int, int, int], None]
+SweepProgress = Callable[[int, int, int], None]
 
 
 @dataclass(frozen=True)
@@ -90,7 +90,7 @@ LOCAL = Workers()
 
 
 def run_sweep(
-    sweep: Sweep, out: Path, workers: Workers = LOCAL, progress: Progress | None = None
+    sweep: Sweep, out: Path, workers: Workers = LOCAL, progress: SweepProgress | None = None
 ) -> Outcome:
     """Runs the episodes that are missing in a folder.
 
@@ -123,7 +123,7 @@ def _run(
     store: Store,
     missing: list[Episode],
     workers: Workers,
-    progress: Progress | None,
+    progress: SweepProgress | None,
 ) -> None:
     check_holdable(sweep)
     done, failures = _finished(store)

@@ -12,8 +12,8 @@ import math
 
 import numpy as np
 
-from fulcrum.synthesis.arrays import Array
-from fulcrum.synthesis.path.rows import Indices, Rows
+from fulcrum.synthesis.arrays import Array, Indices
+from fulcrum.synthesis.path.rows import Rows
 
 
 def timing_cones(rows: Rows, s: Array, b: Indices, c: Indices, t: Indices) -> None:

@@ -35,11 +35,11 @@ from typing import Any, NamedTuple
 import numpy as np
 import scipy.sparse as sp
 
-from fulcrum.synthesis.arrays import Array, Mask
+from fulcrum.synthesis.arrays import Array, Indices, Mask
 from fulcrum.synthesis.conic import ConicForm
 from fulcrum.synthesis.path.cones import timing_cones
 from fulcrum.synthesis.path.problem import Load, PathObjective, PathProblem
-from fulcrum.synthesis.path.rows import Indices, Rows
+from fulcrum.synthesis.path.rows import Rows
 from fulcrum.synthesis.problem import Objective, Problem
 
 

@@ -13,11 +13,10 @@ from enum import StrEnum
 
 import numpy as np
 
-from fulcrum.synthesis.arrays import Array
+from fulcrum.synthesis.arrays import Array, Indices
 from fulcrum.synthesis.contact import ContactModel
 from fulcrum.synthesis.errors import InvalidInputError
 from fulcrum.synthesis.path.limits import Accelerations, Rates, check_array
-from fulcrum.synthesis.path.rows import Indices
 from fulcrum.synthesis.problem import Problem
 
 

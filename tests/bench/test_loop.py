@@ -16,7 +16,7 @@ import pytest
 from fulcrum.scenarios import scenario
 from fulcrum.sim.control.controller import Controller
 from fulcrum.sim.evaluation.monitor import Monitor
-from fulcrum.sim.model.robot import RobotModel
+from fulcrum.sim.model.robot_model import RobotModel
 from fulcrum.sim.model.statics import Statics
 from fulcrum.sim.plant.mujoco import Plant
 from fulcrum.sim.recording import Recorder

@@ -17,7 +17,7 @@ from fulcrum.sim.run.trial import confirm
 from fulcrum.sim.scenario.control import controllers
 from fulcrum.synthesis import InfeasibleError, InvalidInputError, Synthesizer
 from fulcrum.synthesis.analysis.conflict import BALANCES, conflict, rebased, tightest
-from fulcrum.synthesis.analysis.relaxation import Kind, Outcome, changes, weight_range
+from fulcrum.synthesis.analysis.relaxation import ChangeOutcome, Kind, changes, weight_range
 from fulcrum.synthesis.problem import Gravity
 from tests.helpers.problems import cylinder
 
@@ -216,7 +216,7 @@ def test_margins_of_the_pivot():
 
 def test_no_friction_to_speak_of_is_needed_where_the_box_balances():
     friction = explained(71.565, "box-tilt").changes[Kind.FRICTION]
-    assert friction.outcome is Outcome.ALWAYS
+    assert friction.outcome is ChangeOutcome.ALWAYS
 
 
 def test_scan_finds_the_first_infeasible_or_else_the_tightest_tilt():
