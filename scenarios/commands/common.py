@@ -40,7 +40,7 @@ class Chosen:
         Raises:
             InvalidInputError: There is none of that name, or the file is not valid.
         """
-        from fulcrum.scenarios import scenario
+        from fulcrum.scenarios.reading.library import scenario
 
         return scenario(self.scenario, self.allow_path)
 

@@ -18,7 +18,7 @@ class ListCommand:
         from rich.console import Console
         from rich.table import Table
 
-        from fulcrum.scenarios import scenarios
+        from fulcrum.scenarios.reading.library import scenarios
         from fulcrum.sim.scenario.control import Control, controllers
         from fulcrum.synthesis.problem import Objective
 

@@ -81,7 +81,8 @@ class SweepCommand(Chosen):
         """Does it; returns the exit code."""
         from fulcrum.sim.planning.plan import PlanError
         from fulcrum.sim.run.files import write_json
-        from fulcrum.sim.sweep.farm import Workers, run_sweep
+        from fulcrum.sim.run.workers import Workers
+        from fulcrum.sim.sweep.farm import run_sweep
         from fulcrum.sim.sweep.picture import draw_map
         from fulcrum.sim.sweep.store import MAP, SUMMARY, Store
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from fulcrum.scenarios import scenario
+from fulcrum.scenarios.reading.library import scenario
 from fulcrum.sim.planning.path_problems import PathProblems
 from fulcrum.sim.scenario.path import Pivot
 from fulcrum.sim.scenario.scenario import Scenario

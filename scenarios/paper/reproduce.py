@@ -9,7 +9,6 @@ from pathlib import Path
 
 import numpy as np
 
-from fulcrum.scenarios import scenario
 from fulcrum.scenarios.paper.cases import (
     FORCE_OBJECTIVES,
     PAPER_TILT_DEG,
@@ -20,6 +19,7 @@ from fulcrum.scenarios.paper.cases import (
 )
 from fulcrum.scenarios.paper.figures import Curve, Figure, draw
 from fulcrum.scenarios.paper.statements import Statement, all_statements
+from fulcrum.scenarios.reading.library import scenario
 from fulcrum.sim.evaluation.report import Verdict
 from fulcrum.sim.planning.path_problems import PathProblems
 from fulcrum.sim.run.execute import Request, execute

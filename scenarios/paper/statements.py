@@ -6,8 +6,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from fulcrum.scenarios import scenario
 from fulcrum.scenarios.paper.cases import TiltCurve, paper_box, paper_cylinder
+from fulcrum.scenarios.reading.library import scenario
 from fulcrum.sim.planning.path_problems import PathProblems
 from fulcrum.sim.scenario.contacts import Friction
 from fulcrum.sim.scenario.control import controllers

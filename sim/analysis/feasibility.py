@@ -23,13 +23,13 @@ from fulcrum.synthesis import (
     InvalidInputError,
     Objective,
     Problem,
-    RobustInfeasibleError,
     Solution,
     SolverError,
     Synthesizer,
     UnboundedError,
 )
 from fulcrum.synthesis.arrays import Array, N
+from fulcrum.synthesis.robust.certificate import RobustInfeasibleError
 
 # Steps of the tilt [deg].
 _STEP_DEG = 2.5

@@ -29,10 +29,10 @@ from fulcrum.sim.motion.joint_path import PathError
 from fulcrum.sim.placement.freedom import Freedom, Moves
 from fulcrum.sim.placement.value import COARSE, FULL, Goal, Value, assess, settled, touching
 from fulcrum.sim.run.execute import Request, execute
+from fulcrum.sim.run.workers import Workers, cluster
 from fulcrum.sim.scenario.control import Control
 from fulcrum.sim.scenario.control import controller as control_named
 from fulcrum.sim.scenario.scenario import Scenario
-from fulcrum.sim.sweep.farm import Workers, cluster
 from fulcrum.synthesis import FulcrumError
 from fulcrum.synthesis.arrays import Array
 from fulcrum.synthesis.checks import positive, whole

@@ -17,6 +17,11 @@ def name(path):
     return path.relative_to(ROOT).as_posix()
 
 
+def sources():
+    """The text of every module."""
+    return {module: path.read_text() for module, path in SOURCES.items()}
+
+
 def public_types(source):
     """Classes and aliases of types that a module defines for others."""
     found = set()
@@ -30,10 +35,10 @@ def public_types(source):
     return {each for each in found if not each.startswith("_")}
 
 
-def shared_types(sources):
-    """Types that several modules define, each with the modules, of sources by module."""
+def shared_types(texts):
+    """Types that several modules define, each with the modules, of texts by module."""
     owners = {}
-    for module, source in sources.items():
+    for module, source in texts.items():
         for each in public_types(source):
             owners.setdefault(each, []).append(module)
     return {each: modules for each, modules in owners.items() if len(modules) > 1}
@@ -52,35 +57,35 @@ def own_imports(source):
     return own | {(n, "") for m, n in found if m == "fulcrum" and n}
 
 
-def module_graph(sources):
+def module_graph(texts):
     """For each module those that importing it loads; packages of its own are not counted.
 
     To import a module is to import its packages, too, which is not seen in the source.
     """
     graph = {}
-    for module, source in sources.items():
+    for module, source in texts.items():
         graph[module] = set()
         for target, each in own_imports(source):
-            parts = (f"{target}.{each}" if f"{target}.{each}" in sources else target).split(".")
+            parts = (f"{target}.{each}" if f"{target}.{each}" in texts else target).split(".")
             loaded = {".".join(parts[: n + 1]) for n in range(len(parts))}
             own = {package for package in loaded if f"{module}.".startswith(f"{package}.")}
-            graph[module] |= (loaded - own) & set(sources)
+            graph[module] |= (loaded - own) & set(texts)
     return graph
 
 
-def package_graph(sources):
-    """For each package the others that it imports; modules beside packages count as one."""
+def package_graph(modules):
+    """Of a graph of modules that of their packages; modules beside packages count as one."""
     graph = {}
-    for module, targets in module_graph(sources).items():
-        own = package(module, sources)
-        graph.setdefault(own, set()).update(package(target, sources) for target in targets)
+    for module, targets in modules.items():
+        own = package(module, modules)
+        graph.setdefault(own, set()).update(package(target, modules) for target in targets)
         graph[own].discard(own)
     return graph
 
 
-def package(module, sources):
+def package(module, modules):
     """The package that a module is in; a package is in itself."""
-    inside = any(other.startswith(f"{module}.") for other in sources)
+    inside = any(other.startswith(f"{module}.") for other in modules)
     return module if inside else module.rpartition(".")[0]
 
 

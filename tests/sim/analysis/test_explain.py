@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from fulcrum import scenarios
 from fulcrum.scenarios.cli import main
+from fulcrum.scenarios.reading import library
 from fulcrum.sim.analysis.capacity import capacities
 from fulcrum.sim.analysis.explain import explain, tightest_tilt
 from fulcrum.sim.planning.path_problems import PathProblems
@@ -22,7 +22,7 @@ from fulcrum.synthesis.problem import Gravity
 from tests.helpers.problems import cylinder
 
 SYNTHESIZER = Synthesizer()
-BOX_TILT = scenarios.scenario("box-tilt")
+BOX_TILT = library.scenario("box-tilt")
 BOX_LIFT = replace(BOX_TILT, name="box-lift", supports=())
 
 
@@ -271,8 +271,8 @@ def test_closed_loop_bears_the_capacity_out(share, verdict):
 
 @pytest.fixture
 def box_lift(monkeypatch):
-    known = {**scenarios.scenarios(), "box-lift": BOX_LIFT}
-    monkeypatch.setattr(scenarios, "scenarios", lambda: known)
+    known = {**library.scenarios(), "box-lift": BOX_LIFT}
+    monkeypatch.setattr(library, "scenarios", lambda: known)
 
 
 def no_constant(name):

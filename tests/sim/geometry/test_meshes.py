@@ -11,7 +11,7 @@ from scipy.spatial.transform import Rotation
 
 from fulcrum.scenarios import scenario
 from fulcrum.sim.geometry.geom import Geom
-from fulcrum.sim.geometry.shape import homogeneous
+from fulcrum.sim.geometry.object import homogeneous
 from fulcrum.sim.geometry.shapes import Box, Cylinder, HollowCylinder, MeshShape
 from fulcrum.sim.model.inertia import inertial_wrenches
 from fulcrum.sim.model.object_path import ScrewPath

@@ -7,9 +7,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from fulcrum.synthesis import InvalidInputError, Objective, RobustInfeasibleError, Synthesizer
+from fulcrum.synthesis import InvalidInputError, Objective, Synthesizer
 from fulcrum.synthesis.reference import ReferenceInfeasibleError, solve_robust_reference
-from fulcrum.synthesis.robust.certificate import RobustCertificate
+from fulcrum.synthesis.robust.certificate import RobustCertificate, RobustInfeasibleError
 from fulcrum.synthesis.robust.grip import robust_grip
 from fulcrum.synthesis.robust.uncertainty_set import UncertaintySet
 from tests.helpers.problems import arms, box, random_feasible, random_infeasible
