@@ -273,6 +273,7 @@ class PathForm:
         self._free = np.flatnonzero(~fixed)
         self._h = h - whole @ self._constant
         self._A = whole[:, self._free]
+        self._A.eliminate_zeros()  # which are a tenth, and cost the solver time
         q, P = np.zeros(self._columns), np.zeros(self._columns)
         q[self._t] = float(problem.objective is PathObjective.LEAST_TIME)
         if self._margin:
