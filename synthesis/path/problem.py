@@ -247,24 +247,6 @@ class PathProblem:
         both = [[intervals, intervals], [intervals + 1, intervals]]
         return np.array(both).transpose(2, 0, 1).reshape(-1, 2)
 
-    def moving(self, load: int, point: int, a: float, b: float) -> Problem:
-        """(17) at a grid point in motion: what accelerates object and robot counts as load.
-
-        Args:
-            load: Index of the load.
-            point: Index of the grid point.
-            a: Acceleration of s [1/s^2].
-            b: Squared rate of s [1/s^2].
-        """
-        vertex = self.loads[load]
-        problem, joints = vertex.problems[point], vertex.problems[point].joints
-        w_ext_O = problem.w_ext_O - vertex.w_a_O[point] * a - vertex.w_b_O[point] * b
-        if joints is not None and self.inertial_torques is not None:
-            own = self.inertial_torques
-            tau = own.tau_a[point] * a + own.tau_b[point] * b + own.tau_c[point] * math.sqrt(b)
-            joints = replace(joints, tau_g=joints.tau_g + tau)
-        return replace(problem, w_ext_O=w_ext_O, joints=joints)
-
     def timescale(self) -> float:
         """A time in which the path may be covered [s], for units: by speeds, or else by inertia."""
         if math.isfinite(self.duration):

@@ -15,6 +15,7 @@ from fulcrum.synthesis.path.problem import PathObjective
 from fulcrum.synthesis.path.synthesizer import solve_path
 from fulcrum.synthesis.robust.uncertainty_set import UncertaintySet
 from tests.helpers.inverse_dynamics import InverseDynamics, at_stations
+from tests.helpers.paths import moving
 from tests.helpers.plans import BOX, CYLINDER, MARGINS, NAMES, fastest
 
 
@@ -107,9 +108,9 @@ def test_every_station_is_17_with_inertia_and_17_allows_no_faster_start():
     for k in range(0, len(a), 7):
         # A hair slower, as the plan lies on the limits.
         point = problem.stations[k, 0]
-        synthesizer.solve(problem.moving(0, point, 0.9999 * a[k], 0.9999 * b[k]))
+        synthesizer.solve(moving(problem, 0, point, 0.9999 * a[k], 0.9999 * b[k]))
     with pytest.raises(InfeasibleError):
-        synthesizer.solve(problem.moving(0, 0, 1.01 * a[0], b[0]))
+        synthesizer.solve(moving(problem, 0, 0, 1.01 * a[0], b[0]))
 
 
 # --- another formulation
@@ -258,13 +259,13 @@ def servable(planned, world, friction):
     a, b = planned.solution.motion
     synthesizer = Synthesizer()
     for k, (point, _) in enumerate(problem.stations):
-        moving, grip = problem.moving(0, point, a[k], b[k]), planned.solution.w_OC_C[0][k, :, N]
+        there, grip = moving(problem, 0, point, a[k], b[k]), planned.solution.w_OC_C[0][k, :, N]
         contacts = [
             replace(c, f_n_min=0.9999 * f_n, f_n_max=1.0001 * f_n) if i < 2 else c
-            for i, (c, f_n) in enumerate(zip(moving.contacts, grip, strict=True))
+            for i, (c, f_n) in enumerate(zip(there.contacts, grip, strict=True))
         ]
         try:
-            synthesizer.solve(replace(moving, contacts=tuple(contacts)))
+            synthesizer.solve(replace(there, contacts=tuple(contacts)))
         except InfeasibleError:
             return False
     return True
