@@ -41,12 +41,6 @@ class Visual:
     normals: NDArray[np.float32]
     colors: NDArray[np.uint8]
 
-    @property
-    def nbytes(self) -> int:
-        """Size of the arrays [bytes], which is what a recording pays."""
-        arrays = (self.vertices, self.faces, self.normals, self.colors)
-        return sum(array.nbytes for array in arrays)
-
 
 def load_visuals(
     urdf: str, description: Path, links: Collection[str] | None = None

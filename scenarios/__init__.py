@@ -2,39 +2,18 @@
 
 from __future__ import annotations
 
-from functools import cache
-from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from fulcrum.sim.scenario.scenario import Scenario
+    from fulcrum.scenarios.reading.library import scenario, scenarios
+
+__all__ = ["scenario", "scenarios"]
 
 
-@cache
-def scenarios() -> dict[str, Scenario]:
-    """All scenarios that ship, by name."""
-    from fulcrum.scenarios.reading.file import read, scene_files
+def __getattr__(name: str) -> Any:
+    """Import late: the command line, which is in this package, answers `--help` without them."""
+    if name not in __all__:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    from fulcrum.scenarios.reading import library
 
-    return {name: read(file) for name, file in scene_files().items()}
-
-
-def scenario(name_or_file: str, allowed: tuple[Path, ...] = ()) -> Scenario:
-    """The scenario that ships under a name, or that of a file, which is named as the file.
-
-    Args:
-        name_or_file: Its name, or its file's, which ends in ``.toml``.
-        allowed: Folders besides its own from which a file may have others read.
-
-    Raises:
-        InvalidInputError: There is none of that name, or the file is not valid.
-    """
-    from fulcrum.scenarios.reading.file import named_file, read
-    from fulcrum.scenarios.reading.scene import check_scene
-
-    known = scenarios()
-    if name_or_file in known:
-        return known[name_or_file]
-    file = named_file("scenario", name_or_file)
-    found = read(file, allowed)
-    check_scene(file, found)
-    return found
+    return getattr(library, name)

@@ -7,45 +7,42 @@ import io
 import re
 import sys
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import tyro
 
-from fulcrum.scenarios.commands.check import Check
+from fulcrum.scenarios.commands.check import CheckCommand
 from fulcrum.scenarios.commands.common import (
     BAD_INPUT,
     INTERRUPTED,
     Chosen,
 )
-from fulcrum.scenarios.commands.explain import Capacity, Explain
-from fulcrum.scenarios.commands.list import List
-from fulcrum.scenarios.commands.new import New
-from fulcrum.scenarios.commands.place import Place
-from fulcrum.scenarios.commands.plan import Plan
-from fulcrum.scenarios.commands.reproduce import Reproduce
-from fulcrum.scenarios.commands.run import Run
-from fulcrum.scenarios.commands.sweep import Sweep
-from fulcrum.scenarios.commands.view import Screenshot, View
-
-if TYPE_CHECKING:
-    pass
+from fulcrum.scenarios.commands.explain import CapacityCommand, ExplainCommand
+from fulcrum.scenarios.commands.list import ListCommand
+from fulcrum.scenarios.commands.new import NewCommand
+from fulcrum.scenarios.commands.place import PlaceCommand
+from fulcrum.scenarios.commands.plan import PlanCommand
+from fulcrum.scenarios.commands.reproduce import ReproduceCommand
+from fulcrum.scenarios.commands.run import RunCommand
+from fulcrum.scenarios.commands.sweep import SweepCommand
+from fulcrum.scenarios.commands.view import ScreenshotCommand, ViewCommand
 
 # Heavy packages are imported by the commands that need them: `fulcrum --help` answers at once.
 
 
-Command = (
-    Annotated[List, tyro.conf.subcommand("list")]
-    | Annotated[Run, tyro.conf.subcommand("run")]
-    | Annotated[Screenshot, tyro.conf.subcommand("screenshot")]
-    | Annotated[View, tyro.conf.subcommand("view")]
-    | Annotated[Explain, tyro.conf.subcommand("explain")]
-    | Annotated[Check, tyro.conf.subcommand("check")]
-    | Annotated[New, tyro.conf.subcommand("new")]
-    | Annotated[Capacity, tyro.conf.subcommand("capacity")]
-    | Annotated[Place, tyro.conf.subcommand("place")]
-    | Annotated[Plan, tyro.conf.subcommand("plan")]
-    | Annotated[Reproduce, tyro.conf.subcommand("reproduce")]
-    | Annotated[Sweep, tyro.conf.subcommand("sweep")]
+AnyCommand = (
+    Annotated[ListCommand, tyro.conf.subcommand("list")]
+    | Annotated[RunCommand, tyro.conf.subcommand("run")]
+    | Annotated[ScreenshotCommand, tyro.conf.subcommand("screenshot")]
+    | Annotated[ViewCommand, tyro.conf.subcommand("view")]
+    | Annotated[ExplainCommand, tyro.conf.subcommand("explain")]
+    | Annotated[CheckCommand, tyro.conf.subcommand("check")]
+    | Annotated[NewCommand, tyro.conf.subcommand("new")]
+    | Annotated[CapacityCommand, tyro.conf.subcommand("capacity")]
+    | Annotated[PlaceCommand, tyro.conf.subcommand("place")]
+    | Annotated[PlanCommand, tyro.conf.subcommand("plan")]
+    | Annotated[ReproduceCommand, tyro.conf.subcommand("reproduce")]
+    | Annotated[SweepCommand, tyro.conf.subcommand("sweep")]
 )
 
 
@@ -73,25 +70,12 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 def _parse(
     arguments: Sequence[str] | None,
-) -> (
-    List
-    | Run
-    | Screenshot
-    | View
-    | Explain
-    | Check
-    | New
-    | Capacity
-    | Place
-    | Plan
-    | Reproduce
-    | Sweep
-):
+) -> AnyCommand:
     """The command asked for; a parse error leaves as one line instead of tyro's box."""
     errors = io.StringIO()
     try:
         with contextlib.redirect_stderr(errors):
-            return tyro.cli(Command, prog="fulcrum", description=_DESCRIPTION, args=arguments)
+            return tyro.cli(AnyCommand, prog="fulcrum", description=_DESCRIPTION, args=arguments)
     except SystemExit as stop:
         if stop.code == 0:
             raise

@@ -6,8 +6,8 @@ import json
 from pathlib import Path
 
 from fulcrum import assets
-from fulcrum.scenarios import scenarios
 from fulcrum.scenarios.reading.file import SCHEMA, schema
+from fulcrum.scenarios.reading.library import scenarios
 from fulcrum.sim.model.scene import compose
 from fulcrum.sim.motion.ik import plan_joints
 from fulcrum.sim.plant.mujoco import MujocoPlant

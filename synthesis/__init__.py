@@ -3,7 +3,6 @@
 from fulcrum.synthesis.contact import Contact, ContactModel, Role
 from fulcrum.synthesis.errors import FulcrumError, InvalidInputError, SolverError, UnboundedError
 from fulcrum.synthesis.problem import Joints, Objective, Problem
-from fulcrum.synthesis.robust.certificate import RobustInfeasibleError
 from fulcrum.synthesis.solution import (
     Certificate,
     InfeasibleError,
@@ -25,7 +24,6 @@ __all__ = [
     "Objective",
     "Problem",
     "Residuals",
-    "RobustInfeasibleError",
     "Role",
     "Solution",
     "SolverError",

@@ -11,7 +11,6 @@ from __future__ import annotations
 
 import contextlib
 import warnings
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import cvxpy as cp
@@ -61,23 +60,6 @@ def solve_reference(problem: Problem) -> ReferenceSolution:
         SolverError: The solver gave neither.
     """
     return _Formulation(problem).solve()
-
-
-def solve_robust_reference(problems: Sequence[Problem]) -> float:
-    """The objective of the robust counterpart of (17): one grip for all worlds [N].
-
-    Raises:
-        ReferenceInfeasibleError: No normal forces of the hands serve all worlds.
-        SolverError: The solver gave neither.
-    """
-    worlds = [_Formulation(problem) for problem in problems]
-    first = worlds[0]
-    constraints = [constraint for world in worlds for constraint in world.constraints()]
-    for world in worlds[1:]:
-        constraints += [
-            a == b for a, b in zip(first.hand_normals(), world.hand_normals(), strict=True)
-        ]
-    return first.run(cp.Problem(cp.Minimize(first.objective()), constraints))
 
 
 class _Formulation:

@@ -2,12 +2,19 @@
 
 import ast
 import re
-from pathlib import Path
 
 import pytest
 
-ROOT = Path(__file__).parents[1]
-PACKAGES = ("assets", "scenarios", "sim", "synthesis")
+from tests.helpers.house import (
+    FILES,
+    PACKAGES,
+    ROOT,
+    SOURCES,
+    name,
+    shared_types,
+    sources,
+)
+
 # What each package may import of the others; the way of the data is scenarios -> sim -> synthesis.
 ALLOWED = {
     "scenarios": {"sim", "synthesis", "assets"},
@@ -25,11 +32,8 @@ API_WORDS = re.compile(
     re.MULTILINE,
 )
 TESTS = sorted((ROOT / "tests").rglob("*.py"))
-FILES = sorted(path for package in PACKAGES for path in (ROOT / package).rglob("*.py"))
 
-
-def name(path):
-    return path.relative_to(ROOT).as_posix()
+FEWEST_FILES, MOST_FILES = 3, 12
 
 
 def imported(source):
@@ -200,3 +204,31 @@ def test_files_have_at_most_350_lines():
 
 def test_the_package_is_typed():
     assert (ROOT / "src" / "fulcrum" / "py.typed").is_file()
+
+
+def odd_sizes(modules):
+    """Packages of `sim` with too few or too many files, `__init__` not counted."""
+    counts = {}
+    for parts in (module.split(".") for module in modules):
+        if parts[0] == "sim" and len(parts) == 3:
+            counts[parts[1]] = counts.get(parts[1], 0) + 1
+    return {each: n for each, n in counts.items() if not FEWEST_FILES <= n <= MOST_FILES}
+
+
+def test_packages_of_sim_have_few_files_but_several():
+    assert odd_sizes(SOURCES) == {}
+
+
+def test_too_few_and_too_many_files_are_caught():
+    many = [f"sim.run.part_{k}" for k in range(13)]
+    assert odd_sizes(["sim.plant", "sim.plant.a", "sim.plant.b", *many]) == {"plant": 2, "run": 13}
+
+
+def test_no_two_public_types_share_a_name():
+    assert shared_types(sources()) == {}
+
+
+def test_a_name_that_two_modules_define_is_caught():
+    twice = {"a": "class Plan:\n    pass", "b": "Plan = tuple[float, float]", "c": "Plan()"}
+    assert shared_types(twice) == {"Plan": ["a", "b"]}
+    assert shared_types({"a": "class _Own: pass\nLIMIT = 1", "b": "class _Own: pass"}) == {}

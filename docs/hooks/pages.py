@@ -16,7 +16,7 @@ from mkdocs.structure.files import File, Files
 from schema import reference
 
 from fulcrum.scenarios import scenarios
-from fulcrum.scenarios.cli import Command, main
+from fulcrum.scenarios.cli import AnyCommand, main
 from fulcrum.scenarios.reading.file import schema
 
 _ROOT = Path(__file__).parent.parent.parent
@@ -80,7 +80,7 @@ def _python(*arguments: str) -> subprocess.CompletedProcess[str]:
 
 def commands() -> str:
     """What ``--help`` says of every command."""
-    names = [option.__metadata__[0].name for option in get_args(Command)]
+    names = [option.__metadata__[0].name for option in get_args(AnyCommand)]
     parts = ["# Commands", "", "What `fulcrum --help` says, and each command's own.", ""]
     for name in ["", *names]:
         parts += [f"## fulcrum {name}".rstrip(), "", "```text", help_of(name), "```", ""]

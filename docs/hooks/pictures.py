@@ -14,7 +14,7 @@ from fulcrum.assets.models import looks_of
 from fulcrum.assets.visuals import Visual, link_names, load_visuals
 from fulcrum.scenarios import scenarios
 from fulcrum.sim.model.object_path import ObjectPath, object_path
-from fulcrum.sim.model.robot import RobotModel
+from fulcrum.sim.model.robot_model import RobotModel
 from fulcrum.sim.model.scene import ObjectMotion, compose
 from fulcrum.sim.motion.ik import plan_joints
 from fulcrum.sim.motion.joint_path import JointPath

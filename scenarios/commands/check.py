@@ -27,7 +27,7 @@ RESULT, PICTURE = "check.json", "check.png"
 
 
 @dataclass(frozen=True)
-class Check(Chosen):
+class CheckCommand(Chosen):
     """Check a scenario before anything moves: its file, room, reach, limits, and forces."""
 
     controller: str = "robust"

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from fulcrum.sim.scenario.control import Control
     from fulcrum.sim.scenario.scenario import Scenario
 
-Kind = TypeVar("Kind", bound=StrEnum)
+Choice = TypeVar("Choice", bound=StrEnum)
 
 PASSED, FAILED, BAD_INPUT, INTERRUPTED = 0, 1, 2, 130
 
@@ -40,7 +40,7 @@ class Chosen:
         Raises:
             InvalidInputError: There is none of that name, or the file is not valid.
         """
-        from fulcrum.scenarios import scenario
+        from fulcrum.scenarios.reading.library import scenario
 
         return scenario(self.scenario, self.allow_path)
 
@@ -85,7 +85,7 @@ def chosen_control(scenario: Scenario, controller: str, objective: str | None) -
     return replace(control, objective=one_of(Objective, "--objective", objective))
 
 
-def one_of(kind: type[Kind], option: str, text: str) -> Kind:
+def one_of(kind: type[Choice], option: str, text: str) -> Choice:
     """The member of an enumeration that an option names.
 
     Raises:

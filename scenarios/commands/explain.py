@@ -21,7 +21,7 @@ from fulcrum.scenarios.commands.common import (
 if TYPE_CHECKING:
     from rich.console import Console
 
-    from fulcrum.sim.analysis.capacity import Capacity as CapacityFound
+    from fulcrum.sim.analysis.capacity import Capacity
     from fulcrum.sim.analysis.explain import Explanation, Optimum
     from fulcrum.sim.run.trial import Trial
     from fulcrum.synthesis.analysis.conflict import Conflict
@@ -37,7 +37,7 @@ _VISIBLE_PER_M = 0.01
 
 
 @dataclass(frozen=True)
-class Explain(Chosen):
+class ExplainCommand(Chosen):
     """Say why a scenario's problem has no solution and what would help, or how much it bears."""
 
     controller: str = "margin"
@@ -83,7 +83,7 @@ class Explain(Chosen):
 
 
 @dataclass(frozen=True)
-class Capacity(Chosen):
+class CapacityCommand(Chosen):
     """Find the heaviest object that the robot can pivot over the whole path, and can lift."""
 
     controller: str = "margin"
@@ -223,7 +223,7 @@ def _print_optimum(console: Console, optimum: Optimum) -> None:
     console.print(table)
 
 
-def _print_capacity(console: Console, capacity: CapacityFound) -> None:
+def _print_capacity(console: Console, capacity: Capacity) -> None:
     if capacity.weight == math.inf:
         console.print(f"{capacity.manoeuvre}: any weight; nothing limits the grip")
         return

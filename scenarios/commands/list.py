@@ -10,7 +10,7 @@ from fulcrum.scenarios.commands.common import (
 
 
 @dataclass(frozen=True)
-class List:
+class ListCommand:
     """List the scenarios, and the controllers and objectives to run them with."""
 
     def execute(self) -> int:
@@ -18,7 +18,7 @@ class List:
         from rich.console import Console
         from rich.table import Table
 
-        from fulcrum.scenarios import scenarios
+        from fulcrum.scenarios.reading.library import scenarios
         from fulcrum.sim.scenario.control import Control, controllers
         from fulcrum.synthesis.problem import Objective
 

@@ -18,7 +18,7 @@ _NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_-]*")
 
 
 @dataclass(frozen=True)
-class New:
+class NewCommand:
     """Write a scenario file that explains its keys; by default a box that is held by Baxter."""
 
     name: tyro.conf.Positional[str]

@@ -36,7 +36,7 @@ _SEARCHED = 0.9
 
 
 @dataclass(frozen=True)
-class Place(Chosen):
+class PlaceCommand(Chosen):
     """Seek where to stand and where to hold, write the improved file, and say what was gained.
 
     Two hands that mirror each other stay so. The best placement found has passed in closed loop.

@@ -12,7 +12,7 @@ from fulcrum.scenarios.commands.common import FAILED, PASSED, Chosen, asked_plan
 if TYPE_CHECKING:
     from rich.console import Console
 
-    from fulcrum.sim.planning.plan import Plan as Planned
+    from fulcrum.sim.planning.plan import Plan
     from fulcrum.sim.planning.problem import Margins
     from fulcrum.sim.scenario.scenario import Scenario
 
@@ -22,7 +22,7 @@ _LISTED = 0.5
 
 
 @dataclass(frozen=True)
-class Plan(Chosen):
+class PlanCommand(Chosen):
     """Plan the fastest, easiest or safest tilt, with the forces along it; draw and write it."""
 
     objective: str = "least-time"
@@ -51,9 +51,6 @@ class Plan(Chosen):
 
     tip_acceleration: float = math.inf
     """Largest acceleration of the hands' contacts [m/s^2]."""
-
-    force_rate: float | None = None
-    """Largest rate of every contact force, in contact axes [N/s]; without limit if left out."""
 
     robust: bool = False
     """The plan also serves the uncertainty set of controller robust, or as much as it can."""
@@ -113,11 +110,10 @@ class Plan(Chosen):
             grip_max=self.grip_max,
             tip_speed=self.tip_speed,
             tip_acceleration=self.tip_acceleration,
-            force_rate=self.force_rate,
         )
 
 
-def _print(console: Console, planned: Planned) -> None:
+def _print(console: Console, planned: Plan) -> None:
     import numpy as np
     from rich.box import SIMPLE
     from rich.markup import escape

@@ -21,7 +21,7 @@ _MARKS = {
 
 
 @dataclass(frozen=True)
-class Reproduce:
+class ReproduceCommand:
     """Draw the paper's figures 5 to 8, computed and measured; compare every number it states."""
 
     out: Path | None = None

@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True)
-class Run(Chosen):
+class RunCommand(Chosen):
     """Run a scenario headless; write recording, configuration and report; print the verdict."""
 
     controller: str | None = None

@@ -23,7 +23,7 @@ from fulcrum.scenarios.commands.common import (
 if TYPE_CHECKING:
     from fulcrum.sim.run.execute import Result
     from fulcrum.sim.scenario.scenario import Scenario
-    from fulcrum.sim.sweep.design import Sweep as Design
+    from fulcrum.sim.sweep.design import Sweep
     from fulcrum.sim.sweep.summary import Score
     from fulcrum.sim.world.world import World
 
@@ -32,7 +32,7 @@ _NAMED = 4
 
 
 @dataclass(frozen=True)
-class Sweep(Chosen):
+class SweepCommand(Chosen):
     """Run a scenario in many worlds: success rates, causes of failure, success map, replays."""
 
     episodes: int
@@ -81,7 +81,8 @@ class Sweep(Chosen):
         """Does it; returns the exit code."""
         from fulcrum.sim.planning.plan import PlanError
         from fulcrum.sim.run.files import write_json
-        from fulcrum.sim.sweep.farm import Workers, run_sweep
+        from fulcrum.sim.run.workers import Workers
+        from fulcrum.sim.sweep.farm import run_sweep
         from fulcrum.sim.sweep.picture import draw_map
         from fulcrum.sim.sweep.store import MAP, SUMMARY, Store
 
@@ -141,10 +142,10 @@ class Sweep(Chosen):
         _print(found, store.folder, before / minutes if before else None)
         return PASSED
 
-    def _sweep(self) -> Design:
+    def _sweep(self) -> Sweep:
         from fulcrum.sim.planning.execution import planned_tilt
         from fulcrum.sim.scenario.control import controllers
-        from fulcrum.sim.sweep.design import Sweep as Design
+        from fulcrum.sim.sweep.design import Sweep
         from fulcrum.sim.world.parameters import parse_grid
 
         chosen = self.chosen()
@@ -158,7 +159,7 @@ class Sweep(Chosen):
             names = [n for n, c in known.items() if c.feedforward and c.inertia is fast]
         else:
             names = [name.strip() for name in self.controllers.split(",")]
-        return Design(
+        return Sweep(
             scenario=chosen,
             controllers=tuple(names),
             preset=self.preset,
@@ -169,7 +170,7 @@ class Sweep(Chosen):
             called=shlex.join(self.words),
         )
 
-    def _map(self, sweep: Design) -> tuple[str, str]:
+    def _map(self, sweep: Sweep) -> tuple[str, str]:
         from fulcrum.sim.world.parameters import parameter_name
         from fulcrum.synthesis.errors import InvalidInputError
 
@@ -209,7 +210,7 @@ def drawn_world(scenario: Scenario, preset: str, seed: int, values: str) -> Worl
 
 def print_outcome(scenario: Scenario, result: Result) -> None:
     """Prints whether a run would count as success in a sweep, and why not if not."""
-    from fulcrum.sim.model.robot import RobotModel
+    from fulcrum.sim.model.robot_model import RobotModel
     from fulcrum.sim.sweep.criteria import Criteria, violations
 
     found = violations(Criteria(), scenario, RobotModel(scenario).joints, result)

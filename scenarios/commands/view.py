@@ -13,7 +13,7 @@ from fulcrum.scenarios.commands.common import (
 
 
 @dataclass(frozen=True)
-class Screenshot:
+class ScreenshotCommand:
     """Draw a moment of a recording as a picture, without a screen."""
 
     run: tyro.conf.Positional[Path]
@@ -39,7 +39,7 @@ class Screenshot:
 
 
 @dataclass(frozen=True)
-class View:
+class ViewCommand:
     """Open a recording in the Rerun viewer."""
 
     run: tyro.conf.Positional[Path]

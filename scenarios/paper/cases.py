@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from fulcrum.scenarios import scenario
+from fulcrum.scenarios.reading.library import scenario
 from fulcrum.sim.planning.path_problems import PathProblems
 from fulcrum.sim.scenario.path import Pivot
 from fulcrum.sim.scenario.scenario import Scenario
@@ -23,7 +23,7 @@ PAPER_TILT_DEG = 85.0  # of the cylinder, where its figures end
 
 
 @dataclass(frozen=True, eq=False)
-class Sweep:
+class TiltCurve:
     """Solutions of one problem family over the tilt, as far as it is feasible.
 
     Attributes:
@@ -39,7 +39,7 @@ class Sweep:
     solve_s: Array
 
 
-def sweep(problems: PathProblems, tilts_deg: Iterable[float]) -> Sweep:
+def tilt_curve(problems: PathProblems, tilts_deg: Iterable[float]) -> TiltCurve:
     """Solves the problems at the tilts, leaving out the infeasible ones."""
     synthesizer = Synthesizer()
     rows: list[tuple[float, Solution]] = []
@@ -48,7 +48,7 @@ def sweep(problems: PathProblems, tilts_deg: Iterable[float]) -> Sweep:
             rows.append((tilt_deg, synthesizer.solve(problems.problem(tilt_deg))))
         except InfeasibleError:
             continue
-    return Sweep(
+    return TiltCurve(
         tilt_deg=np.array([tilt for tilt, _ in rows]),
         normal=np.array([solution.w_OC_C[:, N] for _, solution in rows]),
         torque=np.array([np.abs(solution.tau).max(initial=0.0) for _, solution in rows]),

@@ -9,17 +9,17 @@ from pathlib import Path
 
 import numpy as np
 
-from fulcrum.scenarios import scenario
 from fulcrum.scenarios.paper.cases import (
     FORCE_OBJECTIVES,
     PAPER_TILT_DEG,
     TORQUE_OBJECTIVES,
-    Sweep,
+    TiltCurve,
     paper_cylinder,
-    sweep,
+    tilt_curve,
 )
 from fulcrum.scenarios.paper.figures import Curve, Figure, draw
 from fulcrum.scenarios.paper.statements import Statement, all_statements
+from fulcrum.scenarios.reading.library import scenario
 from fulcrum.sim.evaluation.report import Verdict
 from fulcrum.sim.planning.path_problems import PathProblems
 from fulcrum.sim.run.execute import Request, execute
@@ -60,14 +60,14 @@ def reproduce(out: Path, step: Step) -> Reproduction:
     exact_box, exact_cylinder = (controllers(s.control)["paper"] for s in (box, cylinder))
     step("box: GFOP and TOP over the tilt")
     box_tilts = np.arange(0.0, 90.5, 1.0)
-    box_sweeps = {
-        name: sweep(PathProblems(box, replace(exact_box, objective=objective)), box_tilts)
+    box_curves = {
+        name: tilt_curve(PathProblems(box, replace(exact_box, objective=objective)), box_tilts)
         for name, objective in (FORCE_OBJECTIVES | TORQUE_OBJECTIVES).items()
     }
     step("cylinder: GFOP over the tilt")
     cylinder_tilts = np.arange(0.0, PAPER_TILT_DEG + 0.5, 1.0)
-    cylinder_sweeps = {
-        name: sweep(
+    cylinder_curves = {
+        name: tilt_curve(
             PathProblems(cylinder, replace(exact_cylinder, objective=objective), False),
             cylinder_tilts,
         )
@@ -81,12 +81,12 @@ def reproduce(out: Path, step: Step) -> Reproduction:
     loops["cylinder"] = closed_loop(scenario("cylinder-tilt"), Objective.MAX_NORMAL_FORCE)
     step("figures")
     for figure in (
-        *_cylinder_figures(cylinder_sweeps, loops["cylinder"]),
-        *_box_figures(box_sweeps, loops["GFOP"], loops["TOP"]),
+        *_cylinder_figures(cylinder_curves, loops["cylinder"]),
+        *_box_figures(box_curves, loops["GFOP"], loops["TOP"]),
     ):
         draw(figure, out)
     step("numbers")
-    statements = all_statements(box_sweeps, cylinder_sweeps)
+    statements = all_statements(box_curves, cylinder_curves)
     errors = {
         name: [grip_error(loop, contact) for contact in range(2)] for name, loop in loops.items()
     }
@@ -99,8 +99,8 @@ def reproduce(out: Path, step: Step) -> Reproduction:
 class Loop:
     """What a closed loop measured over the tilt, and the same computed for the same problem."""
 
-    measured: Sweep
-    computed: Sweep
+    measured: TiltCurve
+    computed: TiltCurve
 
 
 def closed_loop(chosen: Scenario, objective: Objective) -> Loop:
@@ -112,14 +112,14 @@ def closed_loop(chosen: Scenario, objective: Objective) -> Loop:
     trace, history = result.trace, result.history
     tilting = [i for i, p in enumerate(chosen.phases) if p.name == "tilt"]
     rows = np.flatnonzero(np.isin(trace.phase, tilting))[::20]
-    measured = Sweep(
+    measured = TiltCurve(
         tilt_deg=np.degrees(trace.tilt[rows]),
         normal=history.w_measured_C[rows][..., N],
         torque=np.abs(trace.tau[rows]).max(axis=1),
         solve_s=trace.synthesis_s[rows],
     )
     end = chosen.path.angle_deg
-    computed = sweep(PathProblems(chosen, control), np.linspace(0.0, end, round(end) + 1))
+    computed = tilt_curve(PathProblems(chosen, control), np.linspace(0.0, end, round(end) + 1))
     return Loop(measured, computed)
 
 
@@ -132,10 +132,10 @@ def grip_error(loop: Loop, contact: int) -> float:
     return float(np.sqrt(np.mean(error**2)) / loop.computed.normal[:, contact].max())
 
 
-def _curves(sweeps: dict[str, Sweep], contacts: dict[str, int]) -> list[Curve]:
+def _curves(found: dict[str, TiltCurve], contacts: dict[str, int]) -> list[Curve]:
     return [
         Curve(f"{name}, {contact}", s.tilt_deg, s.normal[:, index], _STYLES[name])
-        for name, s in sweeps.items()
+        for name, s in found.items()
         for contact, index in contacts.items()
     ]
 
@@ -160,7 +160,7 @@ def _margins(chosen: Scenario) -> str:
     return f"{100 * control.friction_factor:g} % of the friction, preload {control.preload:g} N"
 
 
-def _cylinder_figures(sweeps: dict[str, Sweep], loop: Loop) -> list[Figure]:
+def _cylinder_figures(found: dict[str, TiltCurve], loop: Loop) -> list[Figure]:
     tilted = scenario("cylinder-tilt")
     depth = -tilted.supports[0].p_OP_O[0] - tilted.hands[0].p_OC_O[0]
     caption = (
@@ -176,19 +176,19 @@ def _cylinder_figures(sweeps: dict[str, Sweep], loop: Loop) -> list[Figure]:
             "Finger forces",
             "normal force [N]",
             caption,
-            tuple(_curves(sweeps, fingers) + _loop_curves("GFOP", loop, fingers)),
+            tuple(_curves(found, fingers) + _loop_curves("GFOP", loop, fingers)),
         ),
         Figure(
             "figure-5b",
             "Environment force",
             "normal force [N]",
             caption,
-            tuple(_curves(sweeps, rim) + _loop_curves("GFOP", loop, rim)),
+            tuple(_curves(found, rim) + _loop_curves("GFOP", loop, rim)),
         ),
     ]
 
 
-def _box_figures(sweeps: dict[str, Sweep], gfop: Loop, top: Loop) -> list[Figure]:
+def _box_figures(found: dict[str, TiltCurve], gfop: Loop, top: Loop) -> list[Figure]:
     caption = (
         "Box of Table II: 20 N, 0.3 x 0.2 x 0.1 m, mu_E 0.25, mu_C 0.1, e_n 0.5 m, hands 0.225 m "
         "along and 0.05 m up from the edge, Baxter's limits. With margin and in closed loop: "
@@ -202,7 +202,7 @@ def _box_figures(sweeps: dict[str, Sweep], gfop: Loop, top: Loop) -> list[Figure
         ("7", "Environment forces", {"edge left": 2, "edge right": 3}),
     ):
         for letter, (kind, loop) in zip("ab", loops.items(), strict=True):
-            own = {name: sweeps[name] for name in kinds[kind]}
+            own = {name: found[name] for name in kinds[kind]}
             curves = _curves(own, contacts) + _loop_curves(kind, loop, contacts)
             title = f"{what}, {kind}"
             figures.append(
@@ -210,7 +210,7 @@ def _box_figures(sweeps: dict[str, Sweep], gfop: Loop, top: Loop) -> list[Figure
                     f"figure-{number}{letter}", title, "normal force [N]", caption, tuple(curves)
                 )
             )
-    torque = [Curve(name, s.tilt_deg, s.torque, _STYLES[name]) for name, s in sweeps.items()]
+    torque = [Curve(name, s.tilt_deg, s.torque, _STYLES[name]) for name, s in found.items()]
     for kind, loop in loops.items():
         torque += [
             Curve(f"{kind} with margin", loop.computed.tilt_deg, loop.computed.torque, "--"),

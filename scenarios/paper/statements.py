@@ -6,8 +6,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from fulcrum.scenarios import scenario
-from fulcrum.scenarios.paper.cases import Sweep, paper_box, paper_cylinder
+from fulcrum.scenarios.paper.cases import TiltCurve, paper_box, paper_cylinder
+from fulcrum.scenarios.reading.library import scenario
 from fulcrum.sim.planning.path_problems import PathProblems
 from fulcrum.sim.scenario.contacts import Friction
 from fulcrum.sim.scenario.control import controllers
@@ -57,15 +57,15 @@ def _feasible(chosen: Scenario, tilt_deg: float, with_joints: bool = False) -> b
     return True
 
 
-def all_statements(box: dict[str, Sweep], cylinder: dict[str, Sweep]) -> list[Statement]:
-    """What the paper states, in its order, given the sweeps of its figures."""
+def all_statements(box: dict[str, TiltCurve], cylinder: dict[str, TiltCurve]) -> list[Statement]:
+    """What the paper states, in its order, given the curves of its figures."""
     return [*_cylinder_statements(cylinder), *_box_statements(box), *_speed(box, cylinder)]
 
 
-def _box_statements(sweeps: dict[str, Sweep]) -> list[Statement]:
+def _box_statements(curves: dict[str, TiltCurve]) -> list[Statement]:
     """What section V.B says of the box."""
     exact, center = _value(paper_box(0.055), 0.0), _value(paper_box(0.05), 0.0)
-    gfop, top = sweeps["GFOP max"], sweeps["TOP max"]
+    gfop, top = curves["GFOP max"], curves["TOP max"]
     least = gfop.tilt_deg[np.argmin(gfop.normal[:, 0])]
     lift = lifted(scenario("box-tilt"))
     lift_off = _value(lift, 0.0)
@@ -163,10 +163,10 @@ def _paper_lift(lift: Scenario) -> Scenario:
     return replace(lift, hands=hands)
 
 
-def _cylinder_statements(sweeps: dict[str, Sweep]) -> list[Statement]:
+def _cylinder_statements(curves: dict[str, TiltCurve]) -> list[Statement]:
     """What section V.A says of the cylinder."""
     tilted = paper_cylinder()
-    gfop = sweeps["GFOP max"]
+    gfop = curves["GFOP max"]
     outer, inner = gfop.normal[:, 0], gfop.normal[:, 1]
     swapped = int(np.argmax(outer > inner))
     before, after = (outer - inner)[swapped - 1 : swapped + 1]
@@ -226,7 +226,7 @@ def _feasible_to(chosen: Scenario) -> float:
     return low
 
 
-def _speed(box: dict[str, Sweep], cylinder: dict[str, Sweep]) -> list[Statement]:
+def _speed(box: dict[str, TiltCurve], cylinder: dict[str, TiltCurve]) -> list[Statement]:
     """Solver times per pose, beside the paper's on a machine of its time."""
     rows = (
         ("cylinder, GFOP", "1.15 s", cylinder["GFOP max"]),
@@ -237,9 +237,9 @@ def _speed(box: dict[str, Sweep], cylinder: dict[str, Sweep]) -> list[Statement]
         Statement(
             f"computation time per pose: {what}",
             paper,
-            f"{1e3 * float(np.median(sweep.solve_s)):.2f} ms",
+            f"{1e3 * float(np.median(curve.solve_s)):.2f} ms",
             None,
             "median solver time on Clarabel; the paper: MATLAB, CVX and SDPT3 at 1.8 GHz",
         )
-        for what, paper, sweep in rows
+        for what, paper, curve in rows
     ]

@@ -22,10 +22,10 @@ from fulcrum.scenarios.reading.places import (
 from fulcrum.scenarios.reading.source import Key, Source, nearest
 from fulcrum.scenarios.schema.tables import HandTable, SupportTable, SurfaceTable
 from fulcrum.sim.geometry.geom import Geom
-from fulcrum.sim.geometry.pose import Pose, Vector
+from fulcrum.sim.geometry.pose import Pose
 from fulcrum.sim.model.contacts import across
 from fulcrum.sim.scenario.contacts import Hand, Support
-from fulcrum.synthesis.arrays import Array
+from fulcrum.synthesis.arrays import Array, Vector
 
 # How far from perpendicular a tangent may be typed in [-]: access are given to a micrometre, on
 # which the normal of a curved face depends. What is off by less than the second stays as it is.

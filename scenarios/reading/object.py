@@ -18,11 +18,12 @@ from fulcrum.scenarios.schema.tables import (
     SurfaceTable,
 )
 from fulcrum.sim.geometry.geom import Geom
-from fulcrum.sim.geometry.object import GRAVITY, Object
-from fulcrum.sim.geometry.pose import Pose, Vector
-from fulcrum.sim.geometry.shape import Shape, homogeneous
+from fulcrum.sim.geometry.object import GRAVITY, Object, homogeneous
+from fulcrum.sim.geometry.pose import Pose
+from fulcrum.sim.geometry.shape import Shape
 from fulcrum.sim.geometry.shapes import Box, Cylinder, HollowCylinder, MeshShape
 from fulcrum.sim.scenario.contacts import Friction
+from fulcrum.synthesis.arrays import Vector
 
 # Spacing of the lines with which MuJoCo draws a plane [m].
 _GRID = 0.05

@@ -16,9 +16,9 @@ from scipy.optimize import minimize_scalar
 
 from fulcrum.sim.geometry.object import GRAVITY
 from fulcrum.sim.planning.path_problems import PathProblems
-from fulcrum.sim.run.execute import Progress
 from fulcrum.sim.scenario.control import Control
 from fulcrum.sim.scenario.scenario import Scenario, lifted
+from fulcrum.sim.signals.progress import Progress
 from fulcrum.synthesis import InfeasibleError, Synthesizer
 from fulcrum.synthesis.analysis.conflict import Conflict, conflict
 from fulcrum.synthesis.analysis.relaxation import Kind, change, weight_range

@@ -10,7 +10,7 @@ import numpy as np
 from fulcrum.sim.planning.path_problems import PathProblems
 from fulcrum.synthesis import InfeasibleError, Solution, Synthesizer
 from fulcrum.synthesis.analysis.conflict import Conflict, and_list, conflict, relaxed, tightest
-from fulcrum.synthesis.analysis.relaxation import Change, Kind, Outcome, changes, weight_range
+from fulcrum.synthesis.analysis.relaxation import Change, ChangeOutcome, Kind, changes, weight_range
 from fulcrum.synthesis.analysis.sensitivity import UNITS, Sensitivities, sensitivities
 from fulcrum.synthesis.arrays import N
 from fulcrum.synthesis.problem import Gravity, Problem
@@ -28,7 +28,7 @@ class Remedy:
     """One kind of change: what is needed of it, or what can be borne.
 
     Attributes:
-        outcome: See :class:`synthesis.analysis.relaxation.Outcome`.
+        outcome: See :class:`synthesis.analysis.relaxation.ChangeOutcome`.
         factor: The border of the feasible factors [-]; infinite for "any weight".
         confirmed_within: How near to the border solving again tells feasible from infeasible [-];
             infinite if not confirmed.
@@ -36,7 +36,7 @@ class Remedy:
         conflict: What stands in the way beyond the border.
     """
 
-    outcome: Outcome
+    outcome: ChangeOutcome
     factor: float
     confirmed_within: float
     text: str
@@ -246,16 +246,16 @@ def _active(solution: Solution) -> tuple[str, ...]:
 def _words(change: Change, problem: Problem, gravity: Gravity) -> str:
     """A change in a few words, with the numbers that it stands for."""
     kind, factor = change.kind, change.factor
-    if change.outcome is Outcome.ABSENT:
+    if change.outcome is ChangeOutcome.ABSENT:
         return f"no {kind}"
-    if change.outcome is Outcome.NEVER:
+    if change.outcome is ChangeOutcome.NEVER:
         return {
             Kind.FRICTION: f"no friction helps (up to {factor:.4g} times)",
             Kind.TORQUE: "does not help, not even without torque limits",
             Kind.WEIGHT: "does not help, not even without weight",
             Kind.GRIP: "does not help, not even without grip limits",
         }[kind]
-    if change.outcome is Outcome.ALWAYS:
+    if change.outcome is ChangeOutcome.ALWAYS:
         if kind is Kind.WEIGHT:
             return "any weight"
         return f"down to {factor:.3g} times and less" if factor else "down to nothing"

@@ -9,7 +9,7 @@ import numpy as np
 from fulcrum.sim.analysis.explain import Explanation, explain
 from fulcrum.sim.analysis.surroundings import Surroundings, surroundings
 from fulcrum.sim.model.grip import GripSchedule
-from fulcrum.sim.model.robot import RobotModel
+from fulcrum.sim.model.robot_model import RobotModel
 from fulcrum.sim.motion.ik import plan_joints
 from fulcrum.sim.motion.joint_path import JointPath, PathError
 from fulcrum.sim.planning.path_problems import PathProblems
@@ -23,13 +23,13 @@ from fulcrum.synthesis import (
     InvalidInputError,
     Objective,
     Problem,
-    RobustInfeasibleError,
     Solution,
     SolverError,
     Synthesizer,
     UnboundedError,
 )
 from fulcrum.synthesis.arrays import Array, N
+from fulcrum.synthesis.robust.certificate import RobustInfeasibleError
 
 # Steps of the tilt [deg].
 _STEP_DEG = 2.5

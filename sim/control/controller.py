@@ -12,7 +12,7 @@ from fulcrum.sim.control.observer import PoseObserver
 from fulcrum.sim.model.grip import GripSchedule
 from fulcrum.sim.model.inertia import inertial_wrenches
 from fulcrum.sim.model.object_path import object_path
-from fulcrum.sim.model.robot import RobotModel
+from fulcrum.sim.model.robot_model import RobotModel
 from fulcrum.sim.model.statics import Statics
 from fulcrum.sim.motion.clock import PathClock
 from fulcrum.sim.motion.joint_path import JointPath

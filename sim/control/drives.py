@@ -29,7 +29,7 @@ from bisect import bisect_right
 import numpy as np
 
 from fulcrum.sim.control.reaction import GripReaction
-from fulcrum.sim.model.robot import RobotModel, RobotState
+from fulcrum.sim.model.robot_model import RobotModel, RobotState
 from fulcrum.sim.scenario.control import Control
 from fulcrum.sim.scenario.scenario import Scenario
 from fulcrum.sim.signals.measurement import Measurement

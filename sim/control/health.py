@@ -9,7 +9,7 @@ import numpy as np
 
 from fulcrum.sim.geometry import quaternion
 from fulcrum.sim.model.object_path import object_path
-from fulcrum.sim.model.robot import RobotModel, RobotState
+from fulcrum.sim.model.robot_model import RobotModel, RobotState
 from fulcrum.sim.scenario.control import Guard
 from fulcrum.sim.scenario.scenario import Scenario
 from fulcrum.sim.signals.event import Cause, Finding

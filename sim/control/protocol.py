@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Protocol
 
-from fulcrum.sim.model.robot import RobotModel
+from fulcrum.sim.model.robot_model import RobotModel
 from fulcrum.sim.scenario.scenario import Scenario
 from fulcrum.sim.signals.command import Command
 from fulcrum.sim.signals.event import Event

@@ -18,7 +18,7 @@ import math
 import numpy as np
 
 from fulcrum.sim.model.contacts import ContactFrames, contacts
-from fulcrum.sim.model.robot import RobotModel
+from fulcrum.sim.model.robot_model import RobotModel
 from fulcrum.sim.scenario.control import Control
 from fulcrum.sim.scenario.scenario import Scenario
 from fulcrum.sim.signals.setpoint import Setpoint

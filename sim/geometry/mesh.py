@@ -11,14 +11,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from fulcrum.sim.scenario.scenario import Scenario
 from fulcrum.synthesis import InvalidInputError
 from fulcrum.synthesis.arrays import Array
 
 # Formats that refer to no other file.
 _FORMATS = (".obj", ".ply", ".stl")
-# MuJoCo touches a mesh's convex hull: a contact so far inside it would be made elsewhere [m].
-_INSIDE_HULL = 0.001
 # How many meshes are kept in memory, with all that has been worked out about them.
 _KEPT = 32
 
@@ -142,25 +139,3 @@ def _mesh(field: str, file: str, scale: tuple[float, ...], data: bytes) -> Mesh:
         axes=axes,
         hull=np.column_stack([hull.face_normals, offsets]),
     )
-
-
-def check_contacts(scenario: Scenario) -> None:
-    """Refuses contacts in the hollows of a mesh, which MuJoCo would fill.
-
-    Raises:
-        InvalidInputError: A contact is more than a millimetre inside the convex hull of its geom,
-            or a mesh cannot be read.
-    """
-    geoms = {geom.name: geom for geom in scenario.object.geoms}
-    placed = [(f"{hand.name}.p_OC_O", hand.geom, hand.p_OC_O) for hand in scenario.hands]
-    placed += [(f"{s.name}.p_OP_O", s.geom, s.p_OP_O) for s in scenario.supports]
-    for field, name, place in placed:
-        geom = geoms[name]
-        if geom.file is None:
-            continue
-        p_G = geom.pose.in_frame(place)
-        depth = read_mesh(f"{name}.file", geom.file, geom.size).inside_hull(p_G)
-        if depth > _INSIDE_HULL:
-            valid = f"at most {1e3 * _INSIDE_HULL:g} mm inside the convex hull of {name}, which is "
-            valid += f"what touches: it is {1e3 * depth:.1f} mm inside"
-            raise InvalidInputError(field, place, valid)

@@ -5,19 +5,16 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from fulcrum.sim.geometry.pose import Quaternion, Vector
-from fulcrum.synthesis import InvalidInputError
-from fulcrum.synthesis.arrays import Array
-from fulcrum.synthesis.checks import length, positive, vector
-
-if TYPE_CHECKING:
-    from fulcrum.sim.geometry.shape import Shape
 from fulcrum.sim.geometry.geom import Geom
+from fulcrum.sim.geometry.pose import Quaternion
+from fulcrum.sim.geometry.shape import COLOR, Color, Shape
+from fulcrum.synthesis import InvalidInputError
+from fulcrum.synthesis.arrays import Array, Vector
+from fulcrum.synthesis.checks import length, positive, vector
 
 GRAVITY = 9.81  # [m/s^2]
 
@@ -66,3 +63,17 @@ class Object:
         x, y, z = self.inertia
         inertia = (factor * x, factor * y, factor * z)
         return replace(self, mass=factor * self.mass, inertia=inertia)
+
+
+def homogeneous(name: str, shape: Shape, mass: float, rgba: Color = COLOR) -> Object:
+    """An object of a shape and a mass [kg], the same all through."""
+    positive(f"{name}.mass", mass)
+    return Object(
+        name=name,
+        mass=mass,
+        inertia=shape.inertia(mass),
+        geoms=shape.geoms(name, rgba),
+        center_of_mass=shape.center,
+        principal_axes=shape.principal_axes,
+        shape=shape,
+    )

@@ -9,10 +9,9 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from fulcrum.synthesis import InvalidInputError
-from fulcrum.synthesis.arrays import Array
+from fulcrum.synthesis.arrays import Array, Vector
 from fulcrum.synthesis.checks import vector
 
-Vector = tuple[float, float, float]
 Quaternion = tuple[float, float, float, float]
 
 

@@ -8,11 +8,10 @@ from typing import NamedTuple, TypeAlias
 import numpy as np
 
 from fulcrum.sim.geometry.geom import Geom
-from fulcrum.sim.geometry.object import Object
-from fulcrum.sim.geometry.pose import Quaternion, Vector, triple
+from fulcrum.sim.geometry.pose import Quaternion, triple
 from fulcrum.synthesis import InvalidInputError
-from fulcrum.synthesis.arrays import Array
-from fulcrum.synthesis.checks import positive, vector
+from fulcrum.synthesis.arrays import Array, Vector
+from fulcrum.synthesis.checks import vector
 
 Color: TypeAlias = tuple[float, float, float, float]
 
@@ -105,20 +104,6 @@ class Shape(ABC):
 
     @abstractmethod
     def _place(self, face: str, u: float, v: float) -> Place: ...
-
-
-def homogeneous(name: str, shape: Shape, mass: float, rgba: Color = COLOR) -> Object:
-    """An object of a shape and a mass [kg], the same all through."""
-    positive(f"{name}.mass", mass)
-    return Object(
-        name=name,
-        mass=mass,
-        inertia=shape.inertia(mass),
-        geoms=shape.geoms(name, rgba),
-        center_of_mass=shape.center,
-        principal_axes=shape.principal_axes,
-        shape=shape,
-    )
 
 
 def cyclic(axis: str, along: float, first: float, second: float) -> Vector:

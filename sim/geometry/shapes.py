@@ -12,10 +12,10 @@ from scipy.spatial.transform import Rotation
 
 from fulcrum.sim.geometry.geom import Geom
 from fulcrum.sim.geometry.mesh import Mesh, read_mesh
-from fulcrum.sim.geometry.pose import Pose, Quaternion, Vector, triple, wxyz
+from fulcrum.sim.geometry.pose import Pose, Quaternion, triple, wxyz
 from fulcrum.sim.geometry.shape import AXES, COLOR, UNTURNED, Color, Place, Shape, cyclic
 from fulcrum.synthesis import InvalidInputError
-from fulcrum.synthesis.arrays import Array
+from fulcrum.synthesis.arrays import Array, Vector
 from fulcrum.synthesis.checks import length, positive
 
 # Flat pieces of a hollow cylinder's wall. Their middles lie on its surfaces; where two meet, they

@@ -7,12 +7,15 @@ import math
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from fulcrum.sim.geometry.pose import Vector
+from fulcrum.sim.geometry.mesh import read_mesh
 from fulcrum.sim.scenario.contacts import Friction
 from fulcrum.sim.scenario.control import Control
 from fulcrum.sim.scenario.scenario import Scenario
-from fulcrum.synthesis import Contact, ContactModel, Role
-from fulcrum.synthesis.arrays import Array
+from fulcrum.synthesis import Contact, ContactModel, InvalidInputError, Role
+from fulcrum.synthesis.arrays import Array, Vector
+
+# MuJoCo touches a mesh's convex hull: a contact so far inside it would be made elsewhere [m].
+_INSIDE_HULL = 0.001
 
 
 def contacts(scenario: Scenario, control: Control) -> tuple[Contact, ...]:
@@ -113,3 +116,25 @@ def across(vector: Array, normal: Array) -> Array:
 
 def _stack(matrices: list[Array]) -> Array:
     return np.array(matrices).reshape(-1, 3, 3)
+
+
+def check_contacts(scenario: Scenario) -> None:
+    """Refuses contacts in the hollows of a mesh, which MuJoCo would fill.
+
+    Raises:
+        InvalidInputError: A contact is more than a millimetre inside the convex hull of its geom,
+            or a mesh cannot be read.
+    """
+    geoms = {geom.name: geom for geom in scenario.object.geoms}
+    placed = [(f"{hand.name}.p_OC_O", hand.geom, hand.p_OC_O) for hand in scenario.hands]
+    placed += [(f"{s.name}.p_OP_O", s.geom, s.p_OP_O) for s in scenario.supports]
+    for field, name, place in placed:
+        geom = geoms[name]
+        if geom.file is None:
+            continue
+        p_G = geom.pose.in_frame(place)
+        depth = read_mesh(f"{name}.file", geom.file, geom.size).inside_hull(p_G)
+        if depth > _INSIDE_HULL:
+            valid = f"at most {1e3 * _INSIDE_HULL:g} mm inside the convex hull of {name}, which is "
+            valid += f"what touches: it is {1e3 * depth:.1f} mm inside"
+            raise InvalidInputError(field, place, valid)

@@ -8,7 +8,7 @@ from fulcrum.sim.geometry import quaternion
 from fulcrum.sim.geometry.object import GRAVITY, Object
 from fulcrum.sim.model.contacts import ContactFrames, contacts
 from fulcrum.sim.model.grip import GripSchedule, pressed
-from fulcrum.sim.model.robot import RobotState
+from fulcrum.sim.model.robot_model import RobotState
 from fulcrum.sim.scenario.control import Control
 from fulcrum.sim.scenario.scenario import Scenario
 from fulcrum.synthesis import Problem

@@ -14,7 +14,7 @@ from fulcrum.sim.model.collisions import DETECTION, collision_pairs, distance
 from fulcrum.sim.model.contacts import ContactFrames
 from fulcrum.sim.model.object_path import object_path
 from fulcrum.sim.model.scene import ObjectMotion, compose, joint_ranges, tip_geom, tip_site
-from fulcrum.sim.motion.joint_path import Grid, JointPath, PathError
+from fulcrum.sim.motion.joint_path import JointGrid, JointPath, PathError
 from fulcrum.sim.motion.schedule import Schedule
 from fulcrum.sim.scenario.scenario import Scenario
 from fulcrum.synthesis.arrays import Array
@@ -34,18 +34,20 @@ _NAMED_COLLISIONS = 3
 _STILL_DAMPING = 1e-2
 
 
-def plan_joints(scenario: Scenario, solved: float = _SOLVED, grid: Grid | None = None) -> JointPath:
+def plan_joints(
+    scenario: Scenario, solved: float = _SOLVED, grid: JointGrid | None = None
+) -> JointPath:
     """Follows the manoeuvre with all hands, within joint, speed and collision limits.
 
     Args:
         scenario: The scene.
         solved: Pose error at which a step counts as solved [m and rad].
-        grid: Steps; those of :class:`Grid` if left out.
+        grid: Steps; those of :class:`JointGrid` if left out.
 
     Raises:
         PathError: A limit stops the arms; names it and the tilt.
     """
-    return _Follower(scenario, solved, grid or Grid()).follow()
+    return _Follower(scenario, solved, grid or JointGrid()).follow()
 
 
 class _Target(NamedTuple):
@@ -54,7 +56,7 @@ class _Target(NamedTuple):
 
 
 class _Follower:
-    def __init__(self, scenario: Scenario, solved: float, grid: Grid) -> None:
+    def __init__(self, scenario: Scenario, solved: float, grid: JointGrid) -> None:
         self._scenario, self._path = scenario, object_path(scenario.path)
         self._solved, self._grid = solved, grid
         self._done, self._steps = 0, 1

@@ -14,7 +14,7 @@ from fulcrum.synthesis.arrays import Array
 
 
 @dataclass(frozen=True)
-class Grid:
+class JointGrid:
     """Steps of a joint path.
 
     A cubic spline through the steps left out here follows the hands to under a micrometre.

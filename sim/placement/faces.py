@@ -8,13 +8,13 @@ import numpy as np
 from scipy.optimize import minimize
 from scipy.spatial.transform import Rotation
 
-from fulcrum.sim.geometry.pose import Vector, triple
+from fulcrum.sim.geometry.pose import triple
 from fulcrum.sim.geometry.shape import Shape
 from fulcrum.sim.model.contacts import across
 from fulcrum.sim.scenario.contacts import Hand
 from fulcrum.sim.scenario.scenario import Scenario
 from fulcrum.synthesis import InvalidInputError
-from fulcrum.synthesis.arrays import Array
+from fulcrum.synthesis.arrays import Array, Vector
 
 Range = tuple[float, float]
 

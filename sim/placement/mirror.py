@@ -7,13 +7,13 @@ from dataclasses import dataclass, replace
 import mujoco
 import numpy as np
 
-from fulcrum.sim.geometry.pose import Vector, triple
+from fulcrum.sim.geometry.pose import triple
 from fulcrum.sim.model.contacts import ContactFrames
 from fulcrum.sim.model.object_path import ObjectPath, object_path
 from fulcrum.sim.model.scene import compose, hand_body
 from fulcrum.sim.scenario.contacts import Hand
 from fulcrum.sim.scenario.scenario import Scenario
-from fulcrum.synthesis.arrays import Array
+from fulcrum.synthesis.arrays import Array, Vector
 
 # Descriptions give frames in rounded numbers [m, and sines].
 _ALIKE = 1e-3

@@ -29,10 +29,10 @@ from fulcrum.sim.motion.joint_path import PathError
 from fulcrum.sim.placement.freedom import Freedom, Moves
 from fulcrum.sim.placement.value import COARSE, FULL, Goal, Value, assess, settled, touching
 from fulcrum.sim.run.execute import Request, execute
+from fulcrum.sim.run.workers import Workers, cluster
 from fulcrum.sim.scenario.control import Control
 from fulcrum.sim.scenario.control import controller as control_named
 from fulcrum.sim.scenario.scenario import Scenario
-from fulcrum.sim.sweep.farm import Workers, cluster
 from fulcrum.synthesis import FulcrumError
 from fulcrum.synthesis.arrays import Array
 from fulcrum.synthesis.checks import positive, whole
@@ -49,7 +49,7 @@ _GAIN = 1e-3
 _KEPT = 0.35
 
 # Called with evaluations done and in total, and a note.
-Progress = Callable[[int, int, str], None]
+SearchProgress = Callable[[int, int, str], None]
 # Calls a function with a task and each of some others, on all processes.
 _Call = Callable[[Callable, bytes, Sequence], list]
 
@@ -127,7 +127,7 @@ def search(
     goal: Goal = Goal.LARGEST_MARGIN,
     freedom: Freedom | None = None,
     effort: Effort | None = None,
-    progress: Progress | None = None,
+    progress: SearchProgress | None = None,
 ) -> Placement:
     """Seeks the best placement.
 
@@ -198,7 +198,7 @@ class _Sampler:
         """Evaluations done."""
         return len(self._tried)
 
-    def run(self, costs: Callable[[list[Array]], list[float]], report: Progress) -> None:
+    def run(self, costs: Callable[[list[Array]], list[float]], report: SearchProgress) -> None:
         """Searches until the evaluations or the time are used up, or nothing changes any more."""
         rng = np.random.default_rng(self._effort.seed)
         # A Sobol sample is even if its size is a power of two.
@@ -220,7 +220,10 @@ class _Sampler:
         )
 
     def _take(
-        self, batch: list[Array], costs: Callable[[list[Array]], list[float]], report: Progress
+        self,
+        batch: list[Array],
+        costs: Callable[[list[Array]], list[float]],
+        report: SearchProgress,
     ) -> list[float]:
         if not self.in_time:  # the first sample has used it up
             return [math.inf] * len(batch)

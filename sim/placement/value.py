@@ -12,10 +12,10 @@ from scipy.spatial.transform import Rotation
 
 from fulcrum.sim.model.collisions import Names, distance, overlapping_links
 from fulcrum.sim.model.object_path import object_path
-from fulcrum.sim.model.robot import RobotModel
+from fulcrum.sim.model.robot_model import RobotModel
 from fulcrum.sim.model.scene import ObjectMotion, compose, is_solid
 from fulcrum.sim.motion.ik import plan_joints
-from fulcrum.sim.motion.joint_path import Grid, PathError
+from fulcrum.sim.motion.joint_path import JointGrid, PathError
 from fulcrum.sim.placement.freedom import rounded, with_posture
 from fulcrum.sim.planning.path_problems import PathProblems
 from fulcrum.sim.scenario.control import Control
@@ -49,7 +49,7 @@ class Steps:
         room: Of its range that every joint keeps clear of its limits [-].
     """
 
-    grid: Grid
+    grid: JointGrid
     solved: float
     tilt_deg: float
     room: float
@@ -57,8 +57,10 @@ class Steps:
 
 # A cubic spline through the coarse steps is off by some 0.1 mm between them; the forces are sought
 # at the steps themselves. What is kept clear of between them is kept farther from.
-COARSE = Steps(Grid(15.0, 0.03, least=1, clearance_m=0.01), solved=1e-5, tilt_deg=15.0, room=0.02)
-FULL = Steps(Grid(), solved=1e-9, tilt_deg=5.0, room=0.0)
+COARSE = Steps(
+    JointGrid(15.0, 0.03, least=1, clearance_m=0.01), solved=1e-5, tilt_deg=15.0, room=0.02
+)
+FULL = Steps(JointGrid(), solved=1e-9, tilt_deg=5.0, room=0.0)
 
 # What a placement lacks, the worst first: each adds a share of 1 at most.
 _OVERLAPS, _OUT_OF_REACH, _STUCK, _CRAMPED, _WITHOUT_FORCES = 5.0, 4.0, 3.0, 2.0, 1.0

@@ -22,7 +22,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from fulcrum.sim.model.grip import GripSchedule
-from fulcrum.sim.model.robot import RobotModel
+from fulcrum.sim.model.robot_model import RobotModel
 from fulcrum.sim.motion.ik import plan_joints
 from fulcrum.sim.motion.joint_path import JointPath
 from fulcrum.sim.motion.schedule import Schedule

@@ -11,11 +11,7 @@ from fulcrum.sim.planning.plan import Plan
 
 
 def plan_content(plan: Plan) -> dict[str, Any]:
-    """Everything about a plan, for JSON.
-
-    Rows of stations are the two ends of every interval, and with a force rate the rests before and
-    after.
-    """
+    """Everything about a plan, for JSON; rows of stations are the two ends of every interval."""
     found, problem = plan.solution, plan.solution.problem
     point = problem.stations[:, 0]
     a, b = found.motion

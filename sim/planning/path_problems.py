@@ -7,7 +7,7 @@ from scipy.spatial.transform import Rotation
 
 from fulcrum.sim.model.grip import GripSchedule
 from fulcrum.sim.model.object_path import object_path
-from fulcrum.sim.model.robot import RobotModel
+from fulcrum.sim.model.robot_model import RobotModel
 from fulcrum.sim.model.statics import Statics, gravity
 from fulcrum.sim.motion.ik import plan_joints
 from fulcrum.sim.motion.joint_path import JointPath

@@ -21,7 +21,7 @@ _NAMED = 6
 def draw(plan: Plan, file: Path) -> None:
     """Writes the picture as PNG."""
     found = plan.solution
-    t = plan.times[found.problem.stations[: 2 * len(plan.times) - 2, 0]]
+    t = plan.times[found.problem.stations[:, 0]]
     canvas, axes = plt.subplots(5, 1, figsize=(9, 13), sharex=True, layout="constrained")
     _motion(plan, axes[0])
     forces = found.w_OC_C[0][: len(t), :, N]

@@ -8,17 +8,16 @@ from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
-from scipy.interpolate import BSpline, make_interp_spline
+from scipy.interpolate import BSpline
 
-from fulcrum.sim.model.robot import RobotModel
+from fulcrum.sim.model.robot_model import RobotModel
 from fulcrum.sim.planning.problem import CERTAIN, Margins, path_problem
 from fulcrum.sim.scenario.scenario import Scenario
 from fulcrum.synthesis import FulcrumError, InvalidInputError
-from fulcrum.synthesis.arrays import Array
+from fulcrum.synthesis.arrays import Array, Indices
 from fulcrum.synthesis.checks import positive
 from fulcrum.synthesis.path.loads import solve_many
 from fulcrum.synthesis.path.problem import PathObjective, PathProblem
-from fulcrum.synthesis.path.rows import Indices
 from fulcrum.synthesis.path.solution import InfeasiblePathError, PathSolution
 from fulcrum.synthesis.robust.uncertainty_set import UncertaintySet
 
@@ -127,10 +126,8 @@ class Plan:
         share = s[k] + elapsed * (start + a * elapsed / 2.0)
         rate = (start + a * elapsed) if moving else 0.0
         a = a if moving else 0.0
-        if self._smooth is not None and moving:
-            a = float(self._smooth[2](np.clip(t, self._smooth[2].t[0], self._smooth[2].t[-1])))
         part = float(np.clip((share - s[k]) / (s[k + 1] - s[k]), 0.0, 1.0))
-        w, tau = self._between(np.array([k]), np.array([part]), np.array([t]))
+        w, tau = self._between(np.array([k]), np.array([part]))
         end = math.radians(self.scenario.path.angle_deg)
         slope, curvature = self.q(share, 1), self.q(share, 2)
         return Moment(
@@ -144,34 +141,12 @@ class Plan:
             tau=tau[0],
         )
 
-    def _between(self, k: Indices, part: Array, t: Array) -> tuple[Array, Array]:
-        """Wrenches, (n, m, 6), and torques, (n, l), that far in intervals k, at times t [s]."""
+    def _between(self, k: Indices, part: Array) -> tuple[Array, Array]:
+        """Wrenches, (n, m, 6), and torques, (n, l), that far in intervals k."""
         w, tau = self.solution.w_OC_C[0], self.solution.tau[0]
-        if self._smooth is not None:
-            t = np.clip(t, self._smooth[0].t[0], self._smooth[0].t[-1])
-            return self._smooth[0](t), self._smooth[1](t)
         first, second = 2 * k, 2 * k + 1
         w = w[first] + part[:, None, None] * (w[second] - w[first])
         return w, tau[first] + part[:, None] * (tau[second] - tau[first])
-
-    @cached_property
-    def _smooth(self) -> tuple[BSpline, ...] | None:
-        """Wrenches, torques and acceleration over time where the force rate is limited.
-
-        The means of intervals, in their middles, and what holds still at rest: the limit is theirs.
-        """
-        found, times = self.solution, self.times
-        if found.problem.force_rate is None:
-            return None
-        ends = 2 * len(times) - 2
-        middles = (times[:-1] + times[1:]) / 2.0
-        knots = np.append(middles, times[list(found.problem.rests)])
-        order = np.argsort(knots)
-        means = (
-            np.concatenate([(each[:ends:2] + each[1:ends:2]) / 2.0, each[ends:]])[order]
-            for each in (found.w_OC_C[0], found.tau[0], found.motion[0])
-        )
-        return tuple(make_interp_spline(knots[order], mean, k=1) for mean in means)
 
     def along(self, tilts: Array) -> Along:
         """The plan over the tilt instead of time, with forces and torques as in :meth:`at`.
@@ -185,8 +160,7 @@ class Plan:
         part = (share - s[k]) / (s[k + 1] - s[k])
         squared = found.b[k] + part * (found.b[k + 1] - found.b[k])
         rate = np.sqrt(np.maximum(squared, 0.0))
-        mean = np.maximum(rate + np.sqrt(found.b[k]), np.finfo(float).tiny) / 2.0
-        w, tau = self._between(k, part, self.times[k] + (share - s[k]) / mean)
+        w, tau = self._between(k, part)
         return Along(rate * math.radians(self.scenario.path.angle_deg), w, tau)
 
     def stretched(self, factor: float) -> Plan:

@@ -14,7 +14,7 @@ from fulcrum.sim.geometry.object import Object
 from fulcrum.sim.model.contacts import contacts
 from fulcrum.sim.model.inertia import inertial_wrenches
 from fulcrum.sim.model.object_path import ObjectPath, object_path
-from fulcrum.sim.model.robot import RobotModel
+from fulcrum.sim.model.robot_model import RobotModel
 from fulcrum.sim.model.statics import Statics, gravity
 from fulcrum.sim.motion.ik import plan_joints
 from fulcrum.sim.motion.joint_path import JointPath
@@ -44,7 +44,6 @@ class Margins:
         grip_min, grip_max: Bounds of the hands' normal forces [N]; their own bounds count, too.
         tip_speed: Largest speed of the hands' contacts [m/s].
         tip_acceleration: Their largest acceleration [m/s^2]: at the end, how softly it is set down.
-        force_rate: Largest rate of every contact force, in contact axes [N/s]; None without limit.
     """
 
     friction_factor: float = 0.8
@@ -53,7 +52,6 @@ class Margins:
     grip_max: float = 60.0
     tip_speed: float = math.inf
     tip_acceleration: float = math.inf
-    force_rate: float | None = None
 
     def __post_init__(self) -> None:
         for name in ("friction_factor", "limits"):
@@ -67,8 +65,6 @@ class Margins:
         for name in ("tip_speed", "tip_acceleration"):
             if not getattr(self, name) > 0.0:
                 raise InvalidInputError(f"margins.{name}", getattr(self, name), "a number > 0")
-        if self.force_rate is not None:
-            positive("margins.force_rate", self.force_rate)
 
 
 def own_margins(control: Control) -> Margins:
@@ -136,7 +132,6 @@ def path_problem(
             np.concatenate([margins.limits * robot.qd_max, rates.limits]),
         ),
         accelerations=accelerations,
-        force_rate=margins.force_rate,
     )
     return problem, curve, robot.joints
 

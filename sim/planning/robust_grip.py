@@ -14,14 +14,15 @@ from itertools import pairwise
 import numpy as np
 
 from fulcrum.sim.model.grip import GripSchedule, pressed
-from fulcrum.sim.model.robot import RobotModel
+from fulcrum.sim.model.robot_model import RobotModel
 from fulcrum.sim.motion.joint_path import JointPath
 from fulcrum.sim.planning.path_problems import PathProblems
 from fulcrum.sim.scenario.control import Control
 from fulcrum.sim.scenario.scenario import Scenario
-from fulcrum.synthesis import Objective, RobustInfeasibleError, SolverError
+from fulcrum.synthesis import Objective, SolverError
 from fulcrum.synthesis.arrays import Array
 from fulcrum.synthesis.problem import Gravity, Problem
+from fulcrum.synthesis.robust.certificate import RobustInfeasibleError
 from fulcrum.synthesis.robust.grip import robust_grip
 from fulcrum.synthesis.robust.scaling import Scaling, largest_scaling
 

@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from fulcrum.sim.model.robot import RobotModel
+from fulcrum.sim.model.robot_model import RobotModel
 from fulcrum.sim.planning.plan import Plan, PlanError, plan
 from fulcrum.sim.planning.problem import CERTAIN, Margins
 from fulcrum.sim.scenario.scenario import Scenario

@@ -10,7 +10,7 @@ from dm_control.rl import control
 from dm_env import specs
 
 from fulcrum.sim.model.object_path import object_path
-from fulcrum.sim.model.robot import RobotModel
+from fulcrum.sim.model.robot_model import RobotModel
 from fulcrum.sim.motion.ik import plan_joints
 from fulcrum.sim.motion.schedule import Schedule
 from fulcrum.sim.plant.mujoco import MujocoPlant

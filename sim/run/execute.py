@@ -8,7 +8,7 @@ import gc
 import signal
 import threading
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from importlib.metadata import version
 from pathlib import Path
 from types import FrameType
@@ -26,14 +26,13 @@ from fulcrum.sim.run.notebook import report_markdown
 from fulcrum.sim.run.preparation import Preparation, prepare
 from fulcrum.sim.scenario.control import Control, controller, default_controller
 from fulcrum.sim.scenario.scenario import Scenario
+from fulcrum.sim.signals.progress import Progress
 from fulcrum.sim.signals.trace import Trace
 from fulcrum.sim.world.world import NO_DEVIATION, World
 
 RECORDING, CONFIG, REPORT = "run.rrd", "config.json", "report.json"
 # Whose versions may change a run's numbers.
 PACKAGES = ("mujoco", "dm-control", "mink", "pin", "clarabel", "rerun-sdk", "numpy", "scipy")
-
-Progress = Callable[[int, int], None]
 
 
 @dataclasses.dataclass(frozen=True)

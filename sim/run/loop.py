@@ -9,7 +9,7 @@ import numpy as np
 from fulcrum.sim.control.protocol import Controller
 from fulcrum.sim.model.contacts import ContactFrames
 from fulcrum.sim.model.object_path import object_path
-from fulcrum.sim.model.robot import RobotModel
+from fulcrum.sim.model.robot_model import RobotModel
 from fulcrum.sim.plant.protocol import DivergedError, Plant
 from fulcrum.sim.scenario.scenario import Scenario
 from fulcrum.sim.signals.measurement import Measurement

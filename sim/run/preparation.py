@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 from fulcrum.sim.analysis.explain import Explanation, explain
 from fulcrum.sim.model.grip import GripSchedule
-from fulcrum.sim.model.robot import RobotModel
+from fulcrum.sim.model.robot_model import RobotModel
 from fulcrum.sim.motion.ik import plan_joints
 from fulcrum.sim.motion.joint_path import JointPath
 from fulcrum.sim.planning.execution import Execution, Planning, planned_tilt

@@ -6,9 +6,10 @@ from dataclasses import dataclass, replace
 
 from fulcrum.sim.evaluation.report import Verdict
 from fulcrum.sim.geometry.object import GRAVITY
-from fulcrum.sim.run.execute import Progress, Request, execute
+from fulcrum.sim.run.execute import Request, execute
 from fulcrum.sim.scenario.control import Control
 from fulcrum.sim.scenario.scenario import Scenario
+from fulcrum.sim.signals.progress import Progress
 
 
 @dataclass(frozen=True)

@@ -6,8 +6,9 @@ import math
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from fulcrum.sim.geometry.pose import Pose, Vector
+from fulcrum.sim.geometry.pose import Pose
 from fulcrum.synthesis import InvalidInputError
+from fulcrum.synthesis.arrays import Vector
 from fulcrum.synthesis.checks import axes, positive, vector
 
 if TYPE_CHECKING:

@@ -8,9 +8,9 @@ from functools import cached_property
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from fulcrum.sim.geometry.pose import Pose, Vector, triple
+from fulcrum.sim.geometry.pose import Pose, triple
 from fulcrum.synthesis import InvalidInputError
-from fulcrum.synthesis.arrays import Array
+from fulcrum.synthesis.arrays import Array, Vector
 from fulcrum.synthesis.checks import length
 
 # The tilt is an angle: where the object does not turn, it would stand still [deg].

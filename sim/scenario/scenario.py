@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING
 
 from fulcrum.sim.geometry.geom import Geom
 from fulcrum.sim.geometry.object import Object
-from fulcrum.sim.geometry.pose import Vector
 from fulcrum.sim.scenario.contacts import Hand, Rest, Support
 from fulcrum.sim.scenario.control import Control
 from fulcrum.sim.scenario.path import Pivot, Poses
@@ -15,6 +14,7 @@ from fulcrum.sim.scenario.phases import FARTHEST_M, HOLD, REACH, STANDOFF, TILT,
 from fulcrum.sim.scenario.physics import Physics, Tolerances
 from fulcrum.sim.scenario.robot import Robot
 from fulcrum.synthesis import InvalidInputError
+from fulcrum.synthesis.arrays import Vector
 from fulcrum.synthesis.checks import not_negative
 
 if TYPE_CHECKING:

@@ -15,7 +15,7 @@ from fulcrum.sim.run.files import finite
 from fulcrum.sim.scenario.control import controllers
 from fulcrum.sim.scenario.scenario import Scenario
 from fulcrum.sim.sweep.criteria import Criteria
-from fulcrum.sim.world.parameters import Grid, overridden
+from fulcrum.sim.world.parameters import ParameterGrid, overridden
 from fulcrum.sim.world.presets import draw, preset
 from fulcrum.sim.world.world import World
 from fulcrum.synthesis import InvalidInputError
@@ -68,7 +68,7 @@ class Sweep:
     preset: str
     episodes: int
     seed: int = 0
-    grid: Grid = ()
+    grid: ParameterGrid = ()
     criteria: Criteria = Criteria()
     planning: Planning | None = None
     called: str = ""

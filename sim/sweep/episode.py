@@ -9,7 +9,7 @@ from collections.abc import Mapping, Sequence
 from functools import lru_cache
 from typing import Any
 
-from fulcrum.sim.model.robot import RobotModel
+from fulcrum.sim.model.robot_model import RobotModel
 from fulcrum.sim.motion.ik import plan_joints
 from fulcrum.sim.planning.execution import planned_tilt
 from fulcrum.sim.run.execute import Request, Result, execute

@@ -2,58 +2,24 @@
 
 from __future__ import annotations
 
-import contextlib
-import logging
-import os
 import pickle
 import uuid
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
-import dask
 import pyarrow as pa
-from distributed import Client, KilledWorker, LocalCluster, as_completed
-from distributed.comm.core import CommClosedError
+from distributed import KilledWorker, as_completed
 
+from fulcrum.sim.run.workers import LOCAL, Workers, cluster
 from fulcrum.sim.sweep.design import Episode, Sweep
 from fulcrum.sim.sweep.episode import check_holdable, run_episode
 from fulcrum.sim.sweep.store import Store
 from fulcrum.sim.sweep.summary import Score, scores
 from fulcrum.synthesis import FulcrumError, InvalidInputError
-from fulcrum.synthesis.checks import whole
-
-# How long a scheduler may take to answer, and its first worker to come [s].
-_PATIENCE_S = 10
-_SETTINGS = {
-    # What workers have to say the driver says, or writes into rows.
-    "distributed.nanny.pre-spawn-environ.DASK_LOGGING__DISTRIBUTED": "critical",
-    # Nobody reads Dask's profile, which it takes a hundred times a second in every process.
-    "distributed.worker.profile.enabled": False,
-}
 
 # Called with episodes finished, episodes in total and failures so far.
-Progress = Callable[[int, int, int], None]
-
-
-@dataclass(frozen=True)
-class Workers:
-    """Who runs the episodes.
-
-    Attributes:
-        count: Of processes on this machine; one for each of its processors if left out.
-        scheduler: Address of a running Dask cluster instead, whose workers have fulcrum installed.
-    """
-
-    count: int | None = None
-    scheduler: str | None = None
-
-    def __post_init__(self) -> None:
-        if self.count is not None:
-            whole("--workers", self.count, least=1)
-        if self.count is not None and self.scheduler is not None:
-            valid = "none beside --scheduler, whose cluster has its own"
-            raise InvalidInputError("--workers", self.count, valid)
+SweepProgress = Callable[[int, int, int], None]
 
 
 class LostEpisodesError(FulcrumError):
@@ -85,12 +51,8 @@ class Outcome:
         return outcome_markdown(self)
 
 
-# One process for each of this machine's processors.
-LOCAL = Workers()
-
-
 def run_sweep(
-    sweep: Sweep, out: Path, workers: Workers = LOCAL, progress: Progress | None = None
+    sweep: Sweep, out: Path, workers: Workers = LOCAL, progress: SweepProgress | None = None
 ) -> Outcome:
     """Runs the episodes that are missing in a folder.
 
@@ -123,7 +85,7 @@ def _run(
     store: Store,
     missing: list[Episode],
     workers: Workers,
-    progress: Progress | None,
+    progress: SweepProgress | None,
 ) -> None:
     check_holdable(sweep)
     done, failures = _finished(store)
@@ -162,37 +124,3 @@ def _finished(store: Store) -> tuple[int, int]:
         return 0, 0
     success = table["success"].to_pylist()
     return len(success), success.count(False)
-
-
-@contextlib.contextmanager
-def cluster(workers: Workers) -> Iterator[Client]:
-    """A client of the cluster; one of its own processes ends with it.
-
-    Raises:
-        InvalidInputError: No cluster answers at the address.
-    """
-    with contextlib.ExitStack() as stack:
-        if workers.scheduler is None:
-            logging.getLogger("distributed").setLevel(logging.CRITICAL)
-            stack.enter_context(dask.config.set(_SETTINGS))
-            address = stack.enter_context(
-                LocalCluster(
-                    n_workers=workers.count or os.cpu_count() or 1,
-                    threads_per_worker=1,
-                    processes=True,
-                    dashboard_address="127.0.0.1:0",  # only for its own use; there is no dashboard
-                    silence_logs=logging.CRITICAL,
-                    preload="fulcrum.sim.sweep.quiet",
-                )
-            )
-        else:
-            address = workers.scheduler
-        valid = "the address of a running Dask scheduler with workers, like tcp://host:8786"
-        try:
-            client = stack.enter_context(Client(address, timeout=_PATIENCE_S))
-            client.wait_for_workers(1, timeout=_PATIENCE_S)
-        except (OSError, ValueError, CommClosedError) as error:
-            raise InvalidInputError(
-                "--scheduler", f"{workers.scheduler} ({error})", valid
-            ) from None
-        yield client

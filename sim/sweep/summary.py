@@ -13,7 +13,7 @@ _CONFIDENCE = 0.95
 
 
 @dataclass(frozen=True)
-class Cause:
+class FailureCause:
     """What failures began with.
 
     Attributes:
@@ -54,7 +54,7 @@ class Score:
     passes: int
     grip_n: float
     grip_max_n: float
-    causes: tuple[Cause, ...]
+    causes: tuple[FailureCause, ...]
 
 
 def scores(rows: pa.Table, hands: tuple[str, ...]) -> tuple[Score, ...]:
@@ -94,6 +94,6 @@ def _score(name: str, rows: list[dict], hands: tuple[str, ...]) -> Score:
         grip_n=float(np.median(grips)) if grips else 0.0,
         grip_max_n=max(grips, default=0.0),
         causes=tuple(
-            Cause(cause, n, n / len(rows), first[cause]) for cause, n in counts.most_common()
+            FailureCause(cause, n, n / len(rows), first[cause]) for cause, n in counts.most_common()
         ),
     )

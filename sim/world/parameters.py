@@ -14,7 +14,7 @@ from fulcrum.sim.scenario.scenario import Scenario
 from fulcrum.sim.world.world import World
 from fulcrum.synthesis import InvalidInputError
 
-Grid = tuple[tuple[str, tuple[float, ...]], ...]
+ParameterGrid = tuple[tuple[str, tuple[float, ...]], ...]
 
 # Rounds off what evenly spaced values have of the binary system, so that commands stay short.
 _DIGITS = 12
@@ -128,7 +128,7 @@ def parse_values(field: str, text: str) -> dict[str, float]:
     return {name: values[0] for name, values in grid}
 
 
-def parse_grid(field: str, text: str) -> Grid:
+def parse_grid(field: str, text: str) -> ParameterGrid:
     """Values per parameter, from text like ``friction=0.7:1.3:7,mass=0.8,1.0,1.2``.
 
     ``first:last:count`` stands for evenly spaced values.

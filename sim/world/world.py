@@ -12,12 +12,13 @@ import numpy as np
 
 from fulcrum.sim.geometry.geom import Geom
 from fulcrum.sim.geometry.object import Object
-from fulcrum.sim.geometry.pose import Vector, triple
+from fulcrum.sim.geometry.pose import triple
 from fulcrum.sim.model.contacts import contact_axes
 from fulcrum.sim.scenario.contacts import Friction, Hand, Rest, Support
 from fulcrum.sim.scenario.scenario import Scenario
 from fulcrum.sim.world.faults import Fault
 from fulcrum.synthesis import InvalidInputError
+from fulcrum.synthesis.arrays import Vector
 from fulcrum.synthesis.checks import finite, not_negative, positive, vector
 
 

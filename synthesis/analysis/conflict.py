@@ -22,7 +22,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from fulcrum.synthesis.analysis.relaxation import Change, Kind, Outcome
+from fulcrum.synthesis.analysis.relaxation import Change, ChangeOutcome, Kind
 from fulcrum.synthesis.arrays import Array, N
 from fulcrum.synthesis.problem import Gravity, Problem
 from fulcrum.synthesis.solution import Certificate
@@ -112,7 +112,7 @@ def tightest(
     """
     for kind in (Kind.WEIGHT, Kind.GRIP, Kind.TORQUE):
         change = found[kind]
-        if change.outcome is Outcome.BOUND and change.conflict is not None:
+        if change.outcome is ChangeOutcome.BOUND and change.conflict is not None:
             proof = rebased(change.conflict, certificate.problem)
             if proof.proves(force_bound):
                 return proof

@@ -49,7 +49,7 @@ class Kind(StrEnum):
     GRIP = "grip limits"
 
 
-class Outcome(StrEnum):
+class ChangeOutcome(StrEnum):
     """What was found about a kind of change.
 
     BOUND: the feasible factors end at the one given. ALWAYS: no factor on the harmful side makes
@@ -80,7 +80,7 @@ class Change:
     """
 
     kind: Kind
-    outcome: Outcome
+    outcome: ChangeOutcome
     factor: float = 1.0
     confirmed_within: float = 0.0
     conflict: Certificate | None = None
@@ -109,11 +109,11 @@ def change(kind: Kind, problem: Problem, gravity: Gravity, synthesizer: Synthesi
         return _linear_change(kind, _weighted(problem, gravity), synthesizer)
     if kind is Kind.GRIP:
         if not any(np.isfinite(c.f_n_max) for c in problem.contacts):
-            return Change(kind, Outcome.ABSENT)
+            return Change(kind, ChangeOutcome.ABSENT)
         return _linear_change(kind, _with_grip(problem), synthesizer)
     joints = problem.joints
     if joints is None or not np.isfinite([joints.tau_min, joints.tau_max]).any():
-        return Change(kind, Outcome.ABSENT)
+        return Change(kind, ChangeOutcome.ABSENT)
     return _linear_change(kind, _with_torque(problem), synthesizer)
 
 
@@ -205,13 +205,13 @@ def _linear_change(kind: Kind, family: _Family, synthesizer: Synthesizer) -> Cha
     except EmptyRangeError:
         conflict = _conflict(family.loosest, synthesizer)
         within = math.inf if conflict is None else 0.0
-        return Change(kind, Outcome.NEVER, 1.0, within, conflict)
+        return Change(kind, ChangeOutcome.NEVER, 1.0, within, conflict)
     feasible = _conflict(family.at(1.0), synthesizer) is None
     upwards = kind is Kind.WEIGHT if feasible else high < 1.0
     factor, other = (high, low) if upwards else (low, high)
     if factor == math.inf or (factor == 0.0 and not upwards):
         conflict = _conflict(family.at(min(factor, _MUCH_WEIGHT)), synthesizer)
-        return Change(kind, Outcome.ALWAYS, factor, 0.0 if conflict is None else math.inf)
+        return Change(kind, ChangeOutcome.ALWAYS, factor, 0.0 if conflict is None else math.inf)
     return _confirmed(kind, family, factor, other, synthesizer)
 
 
@@ -219,7 +219,7 @@ def _friction_change(problem: Problem, synthesizer: Synthesizer) -> Change:
     """Bisects the factor between one that is feasible and one that is not."""
     kind = Kind.FRICTION
     if all(c.model is ContactModel.FRICTIONLESS for c in problem.contacts):
-        return Change(kind, Outcome.ABSENT)
+        return Change(kind, ChangeOutcome.ABSENT)
     family = _Family(at=lambda k: shrink_cones(problem, k), loosest=problem)
     conflict = _conflict(problem, synthesizer)
     last, infeasible = 1.0, conflict is not None
@@ -234,7 +234,9 @@ def _friction_change(problem: Problem, synthesizer: Synthesizer) -> Change:
             factor = _bisected(family, low, high, synthesizer)
             return _confirmed(kind, family, factor, math.inf, synthesizer)
         last, conflict = factor, beyond
-    return Change(kind, Outcome.NEVER if infeasible else Outcome.ALWAYS, last, 0.0, conflict)
+    return Change(
+        kind, ChangeOutcome.NEVER if infeasible else ChangeOutcome.ALWAYS, last, 0.0, conflict
+    )
 
 
 def _bisected(family: _Family, low: float, high: float, synthesizer: Synthesizer) -> float:
@@ -274,8 +276,8 @@ def _confirmed(
         except SolverError:  # Too near to the brink to tell.
             continue
         if held and (contradictory or conflict is not None):
-            return Change(kind, Outcome.BOUND, factor, within, conflict)
-    return Change(kind, Outcome.BOUND, factor, math.inf, conflict)
+            return Change(kind, ChangeOutcome.BOUND, factor, within, conflict)
+    return Change(kind, ChangeOutcome.BOUND, factor, math.inf, conflict)
 
 
 def _conflict(problem: Problem, synthesizer: Synthesizer) -> Certificate | None:

@@ -12,29 +12,11 @@ import math
 
 import numpy as np
 
-from fulcrum.synthesis.arrays import Array
-from fulcrum.synthesis.path.rows import Indices, Rows
+from fulcrum.synthesis.arrays import Array, Indices
+from fulcrum.synthesis.path.rows import Rows
 
 
-def timing_units(s: Array, rate: Array | None, columns: int) -> Array:
-    """Units of all variables, (columns,): what b, c and t, the first, are about; 1 of the others.
-
-    Args:
-        s: Grid points, (K,).
-        rate: As of :func:`timing_cones`; if left out all units are 1.
-        columns: Their number.
-    """
-    units = np.ones(columns)
-    if rate is not None:
-        moving = np.where(rate > 0.0, rate, 1.0)
-        times = 2.0 * np.diff(s) / (rate[:-1] + rate[1:])
-        units[: 3 * len(s) - 1] = np.concatenate([moving**2, moving, times])
-    return units
-
-
-def timing_cones(
-    rows: Rows, s: Array, b: Indices, c: Indices, t: Indices, rate: Array | None = None
-) -> None:
+def timing_cones(rows: Rows, s: Array, b: Indices, c: Indices, t: Indices) -> None:
     r"""Adds :math:`(1 + b) / 2 \ge \|(c, (1 - b) / 2)\|` and, with :math:`r = c_k + c_{k+1}`,
     :math:`(t + r) / 2 \ge \|(\sqrt 2, (t - r) / 2)\|`.
 
@@ -43,19 +25,16 @@ def timing_cones(
         s: Grid points, (K,).
         b, c: Columns of squared rates and rates at the grid points, (K,).
         t: Columns of the times of the intervals, (K - 1,).
-        rate: About how fast the path is at the grid points, per timescale, (K,), positive between
-            the ends; if left out the path's length everywhere.
     """
-    # Rates, and the time of each interval, in units of what they are about: all are about 1.
-    rate = np.full(len(s), s[-1] - s[0]) if rate is None else rate
-    mean, inside = (rate[:-1] + rate[1:]) / 2.0, rate[1:-1]
+    # Rates are in units of the mean rate of the path in one timescale: all numbers are about 1.
+    mean = s[-1] - s[0]
     share = np.diff(s) / mean
     # Rates at the ends are constants: their cones would have no interior, and say nothing.
     if len(s) > 2:
         inner = rows.new(np.tile([0.5, 0.0, 0.5], (len(s) - 2, 1)), s[1:-1], [""] * 3)
-        rows.add(-0.5 / inside**2, inner[:, 0], b[1:-1])
-        rows.add(-1.0 / inside, inner[:, 1], c[1:-1])
-        rows.add(0.5 / inside**2, inner[:, 2], b[1:-1])
+        rows.add(-0.5 / mean**2, inner[:, 0], b[1:-1])
+        rows.add(-1.0 / mean, inner[:, 1], c[1:-1])
+        rows.add(0.5 / mean**2, inner[:, 2], b[1:-1])
         rows.second_order(inner)
     h = np.tile([0.0, math.sqrt(2.0), 0.0], (len(share), 1))
     times = rows.new(h, s[:-1], [""] * 3)

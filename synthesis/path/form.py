@@ -20,10 +20,10 @@ bounds                      of normal forces and torques, of every station and l
 rates                       :math:`b_k \le b_{max,k}`
 duration                    :math:`\sum t_k \le T`
 first margin                :math:`\lambda \le 0` (friction margin, first solve only)
-cones                       friction; :math:`c_k`; :math:`t_k`; accelerations; force rates
+cones                       friction; :math:`c_k`; :math:`t_k`; accelerations
 ==========================  =========================================================
 
-Forces are in units of the largest load, times of :meth:`PathProblem.timescale` or of the pace.
+Forces are in units of the largest load, times of :meth:`PathProblem.timescale`.
 """
 
 from __future__ import annotations
@@ -35,12 +35,11 @@ from typing import Any, NamedTuple
 import numpy as np
 import scipy.sparse as sp
 
-from fulcrum.synthesis.arrays import Array, Mask
+from fulcrum.synthesis.arrays import Array, Indices, Mask
 from fulcrum.synthesis.conic import ConicForm
-from fulcrum.synthesis.path.cones import timing_cones, timing_units
+from fulcrum.synthesis.path.cones import timing_cones
 from fulcrum.synthesis.path.problem import Load, PathObjective, PathProblem
-from fulcrum.synthesis.path.rates import RateCones, durations
-from fulcrum.synthesis.path.rows import Indices, Rows
+from fulcrum.synthesis.path.rows import Rows
 from fulcrum.synthesis.problem import Objective, Problem
 
 
@@ -70,7 +69,6 @@ class PathForm:
         reference: Array | None = None,
         grip: Array | None = None,
         where: Mask | None = None,
-        pace: Array | None = None,
     ) -> None:
         """Assembles the matrices.
 
@@ -80,14 +78,11 @@ class PathForm:
             grip: Normal forces of the n hands [N], (S, n), where they are given.
             where: Which stations count, (S,), where the timing is given; all if left out. S is
                 their number from here on.
-            pace: b [1/s^2], (K,), about which the force rate is limited, without a timing.
         """
         self.problem, self._reference, self._grip = problem, reference, grip
         self.rows = Rows()
         self.unit = max(p.load for load in problem.loads for p in load.problems) or 1.0
-        self._pace = pace if problem.timing is None else problem.timing
-        self._time = problem.timescale() if pace is None else durations(problem.s, pace).sum()
-        self._rate = None if pace is None else np.sqrt(pace) * self._time
+        self._time = problem.timescale()
         self._margin = problem.objective is PathObjective.FRICTION_MARGIN
         self._effort = problem.objective is PathObjective.LEAST_EFFORT
         self._points, self._ds = len(problem.s), np.diff(problem.s)
@@ -140,7 +135,6 @@ class PathForm:
         if self._points == 1:
             return
         slope = per_a / (2.0 * self._ds[self._interval, None] * self._time**2)
-        slope[self._interval < 0] = 0.0
         self.rows.add(slope, rows, self._b[self._interval + 1][:, None])
         self.rows.add(-slope, rows, self._b[self._interval][:, None])
         self.rows.add(per_b / self._time**2, rows, self._b[self._point][:, None])
@@ -242,12 +236,8 @@ class PathForm:
                 heads.append(rows[:, 0])
             self._heads.append(np.stack(heads, axis=1) if heads else np.zeros((0, 0), np.intp))
         if self._timed:
-            timing_cones(self.rows, self.problem.s, self._b, self._c, self._t, self._rate)
+            timing_cones(self.rows, self.problem.s, self._b, self._c, self._t)
             self._acceleration_cones()
-        if self._pace is not None and self.problem.force_rate is not None:
-            cones = RateCones(self.rows, self.problem, self._pace, self._time)
-            for block in self._blocks:
-                cones.add(block.load, block.columns, self._b, self.unit)
 
     def _acceleration_cones(self) -> None:
         limited, point = self.problem.accelerations, self._point
@@ -282,23 +272,22 @@ class PathForm:
             fixed[hands], self._constant[hands] = True, self._grip / self.unit
         self._free = np.flatnonzero(~fixed)
         self._h = h - whole @ self._constant
-        self._scale = timing_units(problem.s, self._rate, self._columns)[self._free]
-        self._A = whole[:, self._free] @ sp.diags_array(self._scale)
+        self._A = whole[:, self._free]
+        self._A.eliminate_zeros()  # which are a tenth, and cost the solver time
         q, P = np.zeros(self._columns), np.zeros(self._columns)
         q[self._t] = float(problem.objective is PathObjective.LEAST_TIME)
         if self._margin:
             q[self._aux] = 1.0
         if self._effort:
             P[self._u] = 2.0 * self._weights()[:, None]
-        self.q = q[self._free] * self._scale
+        self.q = q[self._free]
         self.P = sp.diags_array(P[self._free]).tocsc()
 
     def _weights(self) -> Array:
         """Share of each station in the mean over path and loads, (S,)."""
         share = np.ones(1)
         if self._points > 1:
-            share = np.zeros(len(self._point))
-            share[: 2 * len(self._ds)] = np.repeat(self._ds / self._ds.sum() / 2.0, 2)
+            share = np.repeat(self._ds / self._ds.sum() / 2.0, 2)
         return share / len(self._blocks)
 
     def matrices(self, utilisation: float, slack: list[Array] | None) -> tuple[Any, Array]:
@@ -325,7 +314,7 @@ class PathForm:
     def completed(self, x: Array) -> Array:
         """All variables of those that the solver found."""
         every = self._constant.copy()
-        every[self._free] = x * self._scale
+        every[self._free] = x
         return every
 
     def squared_rates(self, every: Array) -> Array:

@@ -33,16 +33,15 @@ _KNOWN = 3
 def solve_many(problem: PathProblem) -> PathSolution:
     """The optimal timing and grip, and forces with every load, as :func:`solve_path` finds them.
 
-    With least effort or a force rate all loads are solved together, which takes long for many.
+    With least effort all loads are solved together, which takes long for many.
 
     Raises:
         InfeasiblePathError: No timing and grip serve all loads; says where and which limits.
         UnboundedError: The objective improves without limit.
         SolverError: The solver gave neither, or repeated solves do not settle viscous friction.
     """
-    # Effort counts with every load, and a force rate ties the stations, which are looked at alone.
-    together = problem.objective is PathObjective.LEAST_EFFORT or problem.force_rate is not None
-    if len(problem.loads) == 1 or together:
+    # Effort counts with every load.
+    if len(problem.loads) == 1 or problem.objective is PathObjective.LEAST_EFFORT:
         return solve_path(problem)
     chosen, points = [0], len(problem.s)
     count = min(_COARSE, round(_SHARE * points))

@@ -13,11 +13,10 @@ from enum import StrEnum
 
 import numpy as np
 
-from fulcrum.synthesis.arrays import Array
+from fulcrum.synthesis.arrays import Array, Indices
 from fulcrum.synthesis.contact import ContactModel
 from fulcrum.synthesis.errors import InvalidInputError
 from fulcrum.synthesis.path.limits import Accelerations, Rates, check_array
-from fulcrum.synthesis.path.rows import Indices
 from fulcrum.synthesis.problem import Problem
 
 
@@ -109,7 +108,6 @@ class PathProblem:
                                & \text{(16), (7), (5), (6) of the paper} \\
                                & |x_r'| \sqrt b \le x_{r,max}, \quad
                                  \|x_q' a + x_q'' b\| \le x_{q,max} \\
-                               & \|d f_i / d t\| \le R \text{ for every contact force } f_i \\
                                & \textstyle\int ds / \sqrt b \le T
 
     at both ends of every interval of the grid, each with that interval's a: accelerations, and with
@@ -117,9 +115,6 @@ class PathProblem:
 
     Several loads are an uncertain object: a and b and the normal forces of the hands serve all of
     them, while friction and the environment's forces are each load's own.
-
-    With a force rate, which alone is not convex, see :mod:`synthesis.path.rates`, motion from or to
-    rest has a station more there, a = b = 0, for forces begin and end with those that hold.
 
     Objectives: the duration; the mean over the path of the sum of squared torque utilisations
     :math:`2\tau / (\tau_{max} - \tau_{min})`; the largest friction utilisation.
@@ -130,8 +125,6 @@ class PathProblem:
         inertial_torques: Of the robot; None without joints.
         rates: Speed limits.
         accelerations: Acceleration limits.
-        force_rate: Largest rate R of every contact force, the vector in contact axes [N/s]; None
-            without limit.
         objective: Phi.
         duration: Largest duration T [s]; may be infinite.
         start_rate, end_rate: :math:`\dot s` at both ends [1/s].
@@ -147,7 +140,6 @@ class PathProblem:
     inertial_torques: InertialTorques | None = None
     rates: Rates | None = None
     accelerations: Accelerations | None = None
-    force_rate: float | None = None
     objective: PathObjective = PathObjective.LEAST_TIME
     duration: float = math.inf
     start_rate: float = 0.0
@@ -176,8 +168,6 @@ class PathProblem:
             value = getattr(self, name)
             if not (math.isfinite(value) and value >= 0.0):
                 raise InvalidInputError(name, value, "a finite rate >= 0 1/s")
-        if self.force_rate is not None and not 0.0 < self.force_rate < math.inf:
-            raise InvalidInputError("force_rate", self.force_rate, "a finite rate > 0 N/s, or None")
         if not self.duration > 0.0:
             raise InvalidInputError("duration", self.duration, "a time > 0 s")
         if self.timing is not None:
@@ -255,42 +245,13 @@ class PathProblem:
     def stations(self) -> Array:
         """Grid point and interval of every place where the constraints hold, (S, 2) integers.
 
-        Both ends of every interval in order, then rests, whose interval is -1. With a single grid
-        point there is but a rest.
+        Both ends of every interval in order. A single grid point is a rest; its interval is -1.
         """
         intervals = np.arange(len(self.s) - 1)
         if not len(intervals):
             return np.array([[0, -1]])
         both = [[intervals, intervals], [intervals + 1, intervals]]
-        found = np.array(both).transpose(2, 0, 1).reshape(-1, 2)
-        return np.array([*found, *([point, -1] for point in self.rests)])
-
-    @property
-    def rests(self) -> tuple[int, ...]:
-        """Grid points at rest that are stations of their own: ends, with a force rate."""
-        if self.force_rate is None or len(self.s) < 2:
-            return ()
-        rates = (self.start_rate, self.end_rate) if self.timing is None else self.timing[[0, -1]]
-        ends = (0, len(self.s) - 1)
-        return tuple(end for end, rate in zip(ends, rates, strict=True) if rate == 0.0)
-
-    def moving(self, load: int, point: int, a: float, b: float) -> Problem:
-        """(17) at a grid point in motion: what accelerates object and robot counts as load.
-
-        Args:
-            load: Index of the load.
-            point: Index of the grid point.
-            a: Acceleration of s [1/s^2].
-            b: Squared rate of s [1/s^2].
-        """
-        vertex = self.loads[load]
-        problem, joints = vertex.problems[point], vertex.problems[point].joints
-        w_ext_O = problem.w_ext_O - vertex.w_a_O[point] * a - vertex.w_b_O[point] * b
-        if joints is not None and self.inertial_torques is not None:
-            own = self.inertial_torques
-            tau = own.tau_a[point] * a + own.tau_b[point] * b + own.tau_c[point] * math.sqrt(b)
-            joints = replace(joints, tau_g=joints.tau_g + tau)
-        return replace(problem, w_ext_O=w_ext_O, joints=joints)
+        return np.array(both).transpose(2, 0, 1).reshape(-1, 2)
 
     def timescale(self) -> float:
         """A time in which the path may be covered [s], for units: by speeds, or else by inertia."""

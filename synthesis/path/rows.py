@@ -8,11 +8,8 @@ from dataclasses import dataclass
 import clarabel
 import numpy as np
 import scipy.sparse as sp
-from numpy.typing import NDArray
 
-from fulcrum.synthesis.arrays import Array
-
-Indices = NDArray[np.intp]
+from fulcrum.synthesis.arrays import Array, Indices
 
 
 @dataclass(frozen=True, eq=False)

@@ -12,7 +12,6 @@ from fulcrum.synthesis.arrays import Array, N
 from fulcrum.synthesis.contact import ContactSet, utilisation
 from fulcrum.synthesis.errors import FulcrumError
 from fulcrum.synthesis.path.problem import PathProblem
-from fulcrum.synthesis.path.rates import force_rate_shares
 
 # From this share of a limit on a constraint counts as active.
 ACTIVE = 0.999
@@ -38,7 +37,7 @@ class PathResiduals:
 class PathSolution:
     """An optimal timing of a path and the forces along it.
 
-    Stations are the ends of the intervals, and rests, see :attr:`PathProblem.stations`.
+    Stations are the ends of the intervals, see :attr:`PathProblem.stations`.
 
     Attributes:
         problem: What was solved.
@@ -121,13 +120,6 @@ class PathSolution:
             sizes = np.linalg.norm(vectors, axis=2) / limited.limits
             found |= {
                 f"acceleration of {n}": s for n, s in zip(limited.names, sizes.T, strict=True)
-            }
-        if (limit := self.problem.force_rate) is not None and len(self.b) > 1:
-            each = [force_rate_shares(self.problem, limit, self.b, w) for w in self.w_OC_C]
-            contacts = self.problem.loads[0].problems[0].contacts
-            worst = np.max(each, axis=0)
-            found |= {
-                f"force rate of {contacts[i].name}": worst[:, i] for i in range(len(contacts))
             }
         return found
 

@@ -1,15 +1,11 @@
 r"""Solves path problems on Clarabel, to its full accuracy, and proves what it says.
 
 The friction margin is found as in :mod:`synthesis.synthesizer`, by Dinkelbach's method, here with
-the utilisations of all contacts at all stations as its ratios. A force rate is not convex: its
-problem is solved again and again, with an inner approximation about the last timing that was found,
-see :mod:`synthesis.path.rates`. What comes of it is feasible, and a local optimum.
+the utilisations of all contacts at all stations as its ratios.
 """
 
 from __future__ import annotations
 
-import contextlib
-import math
 import time
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
@@ -32,16 +28,6 @@ _SOLVES = 10
 # The least improvement of the friction utilisation that is worth another solve [-].
 _MARGIN_TOLERANCE = 1e-4
 _MARGIN_SOLVES = 30
-# With a force rate: the least improvement that is worth another solve, as a share; how often that
-# may be; and how often the rate of the first pace is halved.
-_RATE_TOLERANCE = 1e-3
-_RATE_SOLVES = 40
-_HALVINGS = 8
-# The square of how much slower than the last pace the next one may be, where the solver stalls.
-_SLOWER = (1.0, 0.98, 0.96)
-# Whether Clarabel equilibrates them, and its static regularisation [-]: where one stalls the next
-# does not.
-_RATE_SETTINGS = ((False, 1e-8), (False, 1e-7), (True, 1e-7), (True, 1e-6))
 # Normal forces below this share of the largest load count as none: their cones are noise.
 _LOADED = 1e-6
 # A proof of infeasibility: violation of its conditions relative to what it proves.
@@ -55,79 +41,23 @@ def solve_path(problem: PathProblem) -> PathSolution:
     Raises:
         InfeasiblePathError: No timing and forces satisfy the constraints; says where and which.
         UnboundedError: The objective improves without limit, as with a grip that nothing bounds.
-        SolverError: The solver gave neither, or repeated solves do not settle viscous friction or
-            the force rate.
+        SolverError: The solver gave neither, or repeated solves do not settle viscous friction.
     """
-    if problem.force_rate is None or problem.timing is not None or len(problem.s) < 2:
-        return _settled(problem)
-    return _within_force_rate(problem)
-
-
-def _settled(problem: PathProblem, pace: Array | None = None) -> PathSolution:
-    """The optimum with viscous friction at the exact rate, about a pace with a force rate."""
-    found = _optimum(PathForm(problem, pace=pace))
+    found = _optimum(PathForm(problem))
     iterations, solve_s = found.iterations, found.solve_s
     for _ in range(_SOLVES):
         if found.residuals.primal <= _EXCESS:
             return replace(found, iterations=iterations, solve_s=solve_s)
-        found = _optimum(PathForm(problem, found.b, pace=pace))
+        found = _optimum(PathForm(problem, found.b))
         iterations += found.iterations
         solve_s += found.solve_s
     raise SolverError(f"no convergence of viscous friction in {_SOLVES} solves")
 
 
-def _within_force_rate(problem: PathProblem) -> PathSolution:
-    """Repeated solves, each about the last one's pace, which only get better.
-
-    The first pace is that of the least time without force rate, or the same motion slower: forces
-    tend to those at rest, whose change along the path is finite, and so slow enough keeps any limit
-    where these do not jump. The error is that about the slowest pace. Other objectives than the
-    least time, and a largest duration, come after that. As the problem is not convex, an error
-    proves that there is no solution about the pace that was tried, not that there is none at all.
-    """
-    quick = replace(problem, objective=PathObjective.LEAST_TIME, duration=math.inf)
-    found = _settled(replace(quick, force_rate=None))
-    spent = [found]
-    for halvings in range(_HALVINGS + 1):
-        try:
-            pace = found.b / 4.0**halvings
-            pace[[0, -1]] = found.b[[0, -1]]
-            found = _settled(quick, pace)
-            break
-        except (InfeasiblePathError, SolverError):
-            if halvings == _HALVINGS:
-                raise
-    spent += _improved(quick, found)
-    if problem.objective is not PathObjective.LEAST_TIME or math.isfinite(problem.duration):
-        spent += _improved(problem, _settled(problem, spent[-1].b))
-    iterations, solve_s = sum(e.iterations for e in spent), sum(e.solve_s for e in spent)
-    return replace(spent[-1], iterations=iterations, solve_s=solve_s)
-
-
-def _improved(problem: PathProblem, found: PathSolution) -> list[PathSolution]:
-    """Solutions one after the other until the value hardly changes, the best one last."""
-    every = [found]
-    for _ in range(_RATE_SOLVES):
-        every.append(_about(problem, every[-1].b))
-        if every[-1].value >= (1.0 - _RATE_TOLERANCE) * every[-2].value:
-            return sorted(every, key=lambda each: -each.value)
-    raise SolverError(f"no convergence of the force rate in {_RATE_SOLVES} solves")
-
-
-def _about(problem: PathProblem, pace: Array) -> PathSolution:
-    """The optimum about a pace, or where the solver stalls about one that is hardly slower."""
-    for slower in _SLOWER[:-1]:
-        with contextlib.suppress(SolverError):
-            return _settled(problem, slower * pace)
-    return _settled(problem, _SLOWER[-1] * pace)
-
-
 def _optimum(form: PathForm) -> PathSolution:
     if form.problem.objective is PathObjective.FRICTION_MARGIN:
         return _largest_margin(form)
-    # Slow paces make the last digit hard to get; residuals are those of the answer in any case.
-    accepted = ("Solved",) if form.problem.force_rate is None else SOLVED
-    found = solve_form(form, 1.0, None, accepted)
+    found = solve_form(form, 1.0, None, ("Solved",))
     return found.solution(form, form.value(found.every))
 
 
@@ -183,7 +113,7 @@ def solve_form(
     started = time.perf_counter()
     iterations = 0
     status = ""
-    for settings in _settings(form.problem.force_rate is not None):
+    for settings in _settings():
         result = clarabel.DefaultSolver(form.P, form.q, A, h, form.rows.cones, settings).solve()
         iterations += result.iterations
         status = str(result.status)
@@ -202,17 +132,8 @@ def solve_form(
     raise SolverError(status)
 
 
-def _settings(rate_limited: bool) -> Iterator[clarabel.DefaultSettings]:
-    """First without iterative refinement, in half the time: the solver stops by true residuals.
-
-    Problems with force rates are scaled already, and where they are degenerate, as always, the
-    linear algebra stalls short of the accuracy with one of the settings, but not with all.
-    """
-    for equilibrated, regularisation in _RATE_SETTINGS if rate_limited else ():
-        settings = solver_settings()
-        settings.equilibrate_enable = equilibrated
-        settings.static_regularization_constant = regularisation
-        yield settings
+def _settings() -> Iterator[clarabel.DefaultSettings]:
+    """First without iterative refinement, in half the time: the solver stops by true residuals."""
     quick = solver_settings()
     quick.iterative_refinement_enable = False
     yield quick

@@ -24,16 +24,12 @@ import math
 from dataclasses import dataclass, fields, replace
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.spatial import ConvexHull, QhullError
 
-from fulcrum.synthesis.arrays import Array, N
+from fulcrum.synthesis.arrays import Array, Indices, N, Vector
 from fulcrum.synthesis.contact import Contact, ContactModel, skew
 from fulcrum.synthesis.errors import InvalidInputError
 from fulcrum.synthesis.problem import Gravity, Joints, Problem
-
-Vector = tuple[float, float, float]
-Indices = NDArray[np.intp]
 
 # Points of a hull that differ by less than this share of its size are one: rounding, and no more.
 _SAME = 1e-9

@@ -250,7 +250,8 @@ def test_visuals_are_complete_and_within_budget():
     ]
     assert [visual.link for visual in visuals] == described
     assert len(visuals) == 18
-    assert sum(visual.nbytes for visual in visuals) < 6e6
+    arrays = [(v.vertices, v.faces, v.normals, v.colors) for v in visuals]
+    assert sum(array.nbytes for each in arrays for array in each) < 6e6
     for visual in visuals:
         assert visual.faces.max() < len(visual.vertices) == len(visual.colors)
         # float32 unit vectors

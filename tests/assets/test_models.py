@@ -11,7 +11,7 @@ from fulcrum.assets import description_path
 from fulcrum.assets.from_urdf import urdf_of
 from fulcrum.assets.models import robot_spec
 from fulcrum.assets.packages import ModelError
-from fulcrum.sim.model.robot import RobotModel, pinocchio_model
+from fulcrum.sim.model.robot_model import RobotModel, pinocchio_model
 from fulcrum.sim.model.scene import compose
 from fulcrum.synthesis import InvalidInputError
 from tests.helpers.models import TETRAHEDRON, TWO_LINKS, scene_with, with_elbow, written

@@ -6,7 +6,7 @@ import mujoco
 import pytest
 
 from fulcrum.assets.mjcf import LOOKS, SOLID
-from fulcrum.sim.model.robot import RobotModel
+from fulcrum.sim.model.robot_model import RobotModel
 from fulcrum.sim.model.scene import compose, unwanted_pairs
 from fulcrum.synthesis import InvalidInputError
 from tests.helpers.models import BOX, FOREIGN, TETRAHEDRON, driving, foreign

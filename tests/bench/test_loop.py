@@ -16,7 +16,7 @@ import pytest
 from fulcrum.scenarios import scenario
 from fulcrum.sim.control.controller import ForceController
 from fulcrum.sim.evaluation.monitor import Monitor
-from fulcrum.sim.model.robot import RobotModel, RobotState
+from fulcrum.sim.model.robot_model import RobotModel, RobotState
 from fulcrum.sim.model.statics import Statics
 from fulcrum.sim.plant.mujoco import MujocoPlant
 from fulcrum.sim.recording import Recorder

@@ -14,7 +14,7 @@ from scipy.spatial.transform import Rotation
 
 from fulcrum.scenarios import scenario
 from fulcrum.sim.model.object_path import ScrewPath
-from fulcrum.sim.model.robot import RobotModel
+from fulcrum.sim.model.robot_model import RobotModel
 from fulcrum.sim.model.statics import Statics
 from fulcrum.sim.motion.ik import plan_joints
 from fulcrum.synthesis import (

@@ -17,7 +17,7 @@ from distributed import LocalCluster
 from markdown_it import MarkdownIt
 
 from fulcrum.scenarios import scenarios
-from fulcrum.scenarios.cli import Command, main
+from fulcrum.scenarios.cli import AnyCommand, main
 from fulcrum.sim.scenario.physics import Tolerances
 from tests.helpers.short_run import short_tilt
 
@@ -174,7 +174,7 @@ def parse(line):
     words = shlex.split(re.sub(r"[\[\]]", "", line))
     try:
         with contextlib.redirect_stderr(io.StringIO()):
-            return tyro.cli(Command, prog="fulcrum", args=words[1:])
+            return tyro.cli(AnyCommand, prog="fulcrum", args=words[1:])
     except SystemExit:
         raise AssertionError(f"not a command: {line}") from None
 

@@ -9,7 +9,7 @@ from typing import NamedTuple
 from fulcrum.scenarios import scenario
 from fulcrum.sim.geometry.geom import Geom
 from fulcrum.sim.geometry.pose import Pose
-from fulcrum.sim.model.robot import RobotModel
+from fulcrum.sim.model.robot_model import RobotModel
 from fulcrum.sim.run.execute import Request, Result, execute
 from fulcrum.sim.scenario.phases import stretched
 from fulcrum.sim.scenario.scenario import Scenario

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 
@@ -74,3 +75,17 @@ def bang_bang_damped(mass, damping, length=LENGTH, force=FORCE):
 
     t = brentq(lambda t: travelled(t)[0] - length, 1e-3, 1e3)
     return travelled(t)[1]
+
+
+def moving(path, load, point, a, b):
+    """(17) of a load at a grid point in motion: what accelerates object and robot counts as load.
+
+    a and b are the acceleration of s and its squared rate there [1/s^2].
+    """
+    vertex, own = path.loads[load], path.inertial_torques
+    problem, joints = vertex.problems[point], vertex.problems[point].joints
+    w_ext_O = problem.w_ext_O - vertex.w_a_O[point] * a - vertex.w_b_O[point] * b
+    if joints is not None and own is not None:
+        tau = own.tau_a[point] * a + own.tau_b[point] * b + own.tau_c[point] * math.sqrt(b)
+        joints = replace(joints, tau_g=joints.tau_g + tau)
+    return replace(problem, w_ext_O=w_ext_O, joints=joints)

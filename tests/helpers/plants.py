@@ -11,7 +11,7 @@ from fulcrum.sim.geometry.object import GRAVITY
 from fulcrum.sim.geometry.pose import Pose
 from fulcrum.sim.model.contacts import ContactFrames
 from fulcrum.sim.model.object_path import ScrewPath
-from fulcrum.sim.model.robot import RobotModel
+from fulcrum.sim.model.robot_model import RobotModel
 from fulcrum.sim.motion.ik import plan_joints
 from fulcrum.sim.plant.mujoco import MujocoPlant
 

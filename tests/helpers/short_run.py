@@ -8,7 +8,7 @@ import numpy as np
 from fulcrum.scenarios import scenario
 from fulcrum.sim.evaluation.judge import Judge
 from fulcrum.sim.evaluation.report import RunInfo
-from fulcrum.sim.model.robot import RobotModel
+from fulcrum.sim.model.robot_model import RobotModel
 from fulcrum.sim.run.execute import Request, execute
 from fulcrum.sim.scenario.phases import Phase
 

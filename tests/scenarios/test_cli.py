@@ -105,7 +105,7 @@ def contents(folder):
 
 def fulcrum(*arguments, cwd=ROOT):
     command = [sys.executable, "-m", "fulcrum.scenarios.cli", *arguments]
-    environment = {"PYTHONPATH": str(ROOT), "PATH": "", "HOME": str(cwd)}
+    environment = {"PYTHONPATH": str(ROOT / "src"), "PATH": "", "HOME": str(cwd)}
     return subprocess.run(
         command, check=False, cwd=cwd, env=environment, capture_output=True, text=True
     )

@@ -9,7 +9,7 @@ import jsonschema
 import pytest
 
 from fulcrum.scenarios import scenario, scenarios
-from fulcrum.scenarios.commands.sweep import Sweep as SweepCommand
+from fulcrum.scenarios.commands.sweep import SweepCommand
 from fulcrum.scenarios.reading.file import SCHEMA, TEMPLATE, read, scene_files, schema
 from fulcrum.scenarios.schema.writer import write
 from fulcrum.sim.scenario.control import Guard

@@ -42,5 +42,5 @@ def test_infeasible_margin_is_infeasible():
 
 
 def test_package_does_not_import_the_reference():
-    code = "import synthesis, sys; sys.exit('cvxpy' in sys.modules)"
+    code = "import fulcrum.synthesis, sys; sys.exit('cvxpy' in sys.modules)"
     assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0

@@ -12,7 +12,7 @@ from fulcrum.assets import asset_path, velocity_limits
 from fulcrum.scenarios import scenario
 from fulcrum.sim.geometry.object import GRAVITY
 from fulcrum.sim.geometry.pose import Pose
-from fulcrum.sim.model.robot import RobotModel
+from fulcrum.sim.model.robot_model import RobotModel
 from fulcrum.sim.model.scene import compose, tip_geom, tip_site
 from fulcrum.sim.motion.ik import plan_joints
 from fulcrum.sim.motion.joint_path import PathError

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from fulcrum import scenarios
 from fulcrum.scenarios.cli import main
+from fulcrum.scenarios.reading import library
 from fulcrum.sim.analysis.capacity import capacities
 from fulcrum.sim.analysis.explain import explain, tightest_tilt
 from fulcrum.sim.planning.path_problems import PathProblems
@@ -17,12 +17,12 @@ from fulcrum.sim.run.trial import confirm
 from fulcrum.sim.scenario.control import controllers
 from fulcrum.synthesis import InfeasibleError, InvalidInputError, Synthesizer
 from fulcrum.synthesis.analysis.conflict import BALANCES, conflict, rebased, tightest
-from fulcrum.synthesis.analysis.relaxation import Kind, Outcome, changes, weight_range
+from fulcrum.synthesis.analysis.relaxation import ChangeOutcome, Kind, changes, weight_range
 from fulcrum.synthesis.problem import Gravity
 from tests.helpers.problems import cylinder
 
 SYNTHESIZER = Synthesizer()
-BOX_TILT = scenarios.scenario("box-tilt")
+BOX_TILT = library.scenario("box-tilt")
 BOX_LIFT = replace(BOX_TILT, name="box-lift", supports=())
 
 
@@ -216,7 +216,7 @@ def test_margins_of_the_pivot():
 
 def test_no_friction_to_speak_of_is_needed_where_the_box_balances():
     friction = explained(71.565, "box-tilt").changes[Kind.FRICTION]
-    assert friction.outcome is Outcome.ALWAYS
+    assert friction.outcome is ChangeOutcome.ALWAYS
 
 
 def test_scan_finds_the_first_infeasible_or_else_the_tightest_tilt():
@@ -271,8 +271,8 @@ def test_closed_loop_bears_the_capacity_out(share, verdict):
 
 @pytest.fixture
 def box_lift(monkeypatch):
-    known = {**scenarios.scenarios(), "box-lift": BOX_LIFT}
-    monkeypatch.setattr(scenarios, "scenarios", lambda: known)
+    known = {**library.scenarios(), "box-lift": BOX_LIFT}
+    monkeypatch.setattr(library, "scenarios", lambda: known)
 
 
 def no_constant(name):

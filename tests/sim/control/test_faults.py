@@ -9,7 +9,7 @@ import pytest
 from fulcrum.scenarios import scenario
 from fulcrum.scenarios.cli import main
 from fulcrum.sim.evaluation.report import Verdict
-from fulcrum.sim.model.robot import RobotModel
+from fulcrum.sim.model.robot_model import RobotModel
 from fulcrum.sim.motion.schedule import Schedule
 from fulcrum.sim.run.assembly import closed_loop
 from fulcrum.sim.run.notebook import report_markdown

@@ -11,7 +11,7 @@ from fulcrum.scenarios import scenario
 from fulcrum.sim.control.controller import Controller
 from fulcrum.sim.control.observer import PoseObserver
 from fulcrum.sim.model.object_path import ScrewPath, minimum_jerk
-from fulcrum.sim.model.robot import RobotModel
+from fulcrum.sim.model.robot_model import RobotModel
 from fulcrum.sim.motion.ik import plan_joints
 from fulcrum.sim.motion.schedule import Schedule
 from fulcrum.sim.signals.measurement import Measurement

@@ -15,8 +15,9 @@ from fulcrum.sim.scenario.control import Robustness, controllers
 from fulcrum.sim.signals.measurement import Measurement
 from fulcrum.sim.signals.setpoint import Setpoint
 from fulcrum.sim.signals.target import Target
-from fulcrum.synthesis import InvalidInputError, RobustInfeasibleError, Synthesizer
+from fulcrum.synthesis import InvalidInputError, Synthesizer
 from fulcrum.synthesis.arrays import N
+from fulcrum.synthesis.robust.certificate import RobustInfeasibleError
 from fulcrum.synthesis.robust.grip import robust_grip
 from fulcrum.synthesis.robust.uncertainty_set import UncertaintySet
 from tests.helpers.plants import ROBOT, planned

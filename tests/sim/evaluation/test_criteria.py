@@ -6,7 +6,7 @@ from dataclasses import fields, replace
 import numpy as np
 import pytest
 
-from fulcrum.sim.model.robot import RobotModel
+from fulcrum.sim.model.robot_model import RobotModel
 from fulcrum.sim.signals.trace import stretches
 from fulcrum.sim.sweep.criteria import Criteria, violations
 from fulcrum.synthesis import InvalidInputError

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from fulcrum.sim.evaluation.report import Verdict
-from fulcrum.sim.model.robot import RobotModel
+from fulcrum.sim.model.robot_model import RobotModel
 from fulcrum.synthesis.arrays import N
 from tests.helpers.short_run import (
     EDGE_LEFT,

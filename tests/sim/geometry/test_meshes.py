@@ -11,11 +11,11 @@ from scipy.spatial.transform import Rotation
 
 from fulcrum.scenarios import scenario
 from fulcrum.sim.geometry.geom import Geom
-from fulcrum.sim.geometry.shape import homogeneous
+from fulcrum.sim.geometry.object import homogeneous
 from fulcrum.sim.geometry.shapes import Box, Cylinder, HollowCylinder, MeshShape
 from fulcrum.sim.model.inertia import inertial_wrenches
 from fulcrum.sim.model.object_path import ScrewPath
-from fulcrum.sim.model.robot import RobotModel
+from fulcrum.sim.model.robot_model import RobotModel
 from fulcrum.sim.model.scene import compose
 from fulcrum.sim.recording.scenery import Scenery
 from fulcrum.sim.world.world import World

@@ -10,7 +10,7 @@ from scipy.spatial.transform import Rotation
 
 from fulcrum.scenarios import scenario, scenarios
 from fulcrum.sim.geometry.pose import Pose
-from fulcrum.sim.model.robot import RobotModel, pinocchio_model
+from fulcrum.sim.model.robot_model import RobotModel, pinocchio_model
 from tests.helpers.beliefs import (
     ROUNDING,
     SAMPLES,

@@ -9,7 +9,7 @@ import pytest
 from fulcrum.assets import velocity_limits
 from fulcrum.scenarios import scenario
 from fulcrum.sim.geometry.pose import Pose
-from fulcrum.sim.model.robot import RobotModel
+from fulcrum.sim.model.robot_model import RobotModel
 from fulcrum.sim.model.scene import ObjectMotion, compose, hand_body
 from fulcrum.sim.scenario.robot import Robot
 from fulcrum.synthesis import InvalidInputError

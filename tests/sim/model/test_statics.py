@@ -10,7 +10,7 @@ from scipy.spatial.transform import Rotation
 from fulcrum.scenarios import scenario, scenarios
 from fulcrum.sim.model.contacts import ContactFrames, contacts, true_contacts
 from fulcrum.sim.model.object_path import ScrewPath
-from fulcrum.sim.model.robot import RobotModel
+from fulcrum.sim.model.robot_model import RobotModel
 from fulcrum.sim.model.statics import Statics
 from fulcrum.sim.motion.ik import plan_joints
 from fulcrum.sim.planning.path_problems import PathProblems

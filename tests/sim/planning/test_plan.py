@@ -15,6 +15,7 @@ from fulcrum.synthesis.path.problem import PathObjective
 from fulcrum.synthesis.path.synthesizer import solve_path
 from fulcrum.synthesis.robust.uncertainty_set import UncertaintySet
 from tests.helpers.inverse_dynamics import InverseDynamics, at_stations
+from tests.helpers.paths import moving
 from tests.helpers.plans import BOX, CYLINDER, MARGINS, NAMES, fastest
 
 
@@ -107,9 +108,9 @@ def test_every_station_is_17_with_inertia_and_17_allows_no_faster_start():
     for k in range(0, len(a), 7):
         # A hair slower, as the plan lies on the limits.
         point = problem.stations[k, 0]
-        synthesizer.solve(problem.moving(0, point, 0.9999 * a[k], 0.9999 * b[k]))
+        synthesizer.solve(moving(problem, 0, point, 0.9999 * a[k], 0.9999 * b[k]))
     with pytest.raises(InfeasibleError):
-        synthesizer.solve(problem.moving(0, 0, 1.01 * a[0], b[0]))
+        synthesizer.solve(moving(problem, 0, 0, 1.01 * a[0], b[0]))
 
 
 # --- another formulation
@@ -217,24 +218,16 @@ def test_soft_hands_take_longer_and_keep_their_limits():
     assert shares["acceleration of left"].max() == pytest.approx(1.0, abs=1e-6)
 
 
-def test_a_limited_force_rate_holds_at_every_instant_and_forces_fit_the_motion():
-    check, rate = InverseDynamics(scenario(BOX)), 30.0
-    worst, steepest = [], []
-    for limit in (rate, None):
-        planned = plan(scenario(BOX), replace(MARGINS[BOX], force_rate=limit), points=41)
-        assert max(lacking(check, moment) for moment in at_stations(planned)) < 1e-9
-        times = np.linspace(0.0, planned.duration, 601)
-        moments = [planned.at(t) for t in times]
-        change = np.diff([moment.w_OC_C[:, :3] for moment in moments], axis=0)
-        steepest.append(np.linalg.norm(change, axis=2).max() / times[1])
-        # The tilt's rounding stands between them.
-        along = planned.along(np.array([moment.tilt for moment in moments[1:-1:50]]))
-        again = np.array([moment.w_OC_C for moment in moments[1:-1:50]])
-        np.testing.assert_allclose(along.w_OC_C, again, atol=1e-6)
-        worst.append(np.median([lacking(check, moment) for moment in moments[1:-1]]))
-    assert steepest[0] < 1.01 * rate < steepest[1] / 10.0
-    # Between grid points both are off by the square of the grid's width: 1 % of a newton.
-    assert max(worst) < 0.02
+def test_forces_fit_the_motion_between_grid_points_over_time_and_over_the_tilt():
+    check, planned = InverseDynamics(scenario(BOX)), plan(scenario(BOX), MARGINS[BOX], points=41)
+    assert max(lacking(check, moment) for moment in at_stations(planned)) < 1e-9
+    moments = [planned.at(t) for t in np.linspace(0.0, planned.duration, 601)[1:-1]]
+    # The tilt's rounding stands between them.
+    along = planned.along(np.array([moment.tilt for moment in moments[::50]]))
+    again = np.array([moment.w_OC_C for moment in moments[::50]])
+    np.testing.assert_allclose(along.w_OC_C, again, atol=1e-6)
+    # Between grid points it is off by the square of the grid's width: 1 % of a newton.
+    assert np.median([lacking(check, moment) for moment in moments]) < 0.02
 
 
 def lacking(check, moment):
@@ -266,13 +259,13 @@ def servable(planned, world, friction):
     a, b = planned.solution.motion
     synthesizer = Synthesizer()
     for k, (point, _) in enumerate(problem.stations):
-        moving, grip = problem.moving(0, point, a[k], b[k]), planned.solution.w_OC_C[0][k, :, N]
+        there, grip = moving(problem, 0, point, a[k], b[k]), planned.solution.w_OC_C[0][k, :, N]
         contacts = [
             replace(c, f_n_min=0.9999 * f_n, f_n_max=1.0001 * f_n) if i < 2 else c
-            for i, (c, f_n) in enumerate(zip(moving.contacts, grip, strict=True))
+            for i, (c, f_n) in enumerate(zip(there.contacts, grip, strict=True))
         ]
         try:
-            synthesizer.solve(replace(moving, contacts=tuple(contacts)))
+            synthesizer.solve(replace(there, contacts=tuple(contacts)))
         except InfeasibleError:
             return False
     return True
@@ -321,7 +314,6 @@ def test_the_lift_has_no_plan():
         {"grip_max": 4.0},
         {"tip_speed": 0.0},
         {"tip_acceleration": math.nan},
-        {"force_rate": 0.0},
     ],
 )
 def test_senseless_margins_are_refused_by_name(wrong):

@@ -7,7 +7,7 @@ import pytest
 from fulcrum.scenarios import scenario
 from fulcrum.sim.model.contacts import ContactFrames
 from fulcrum.sim.model.object_path import ScrewPath
-from fulcrum.sim.model.robot import RobotModel
+from fulcrum.sim.model.robot_model import RobotModel
 from fulcrum.sim.motion.ik import plan_joints
 from fulcrum.sim.motion.schedule import Schedule
 from fulcrum.sim.planning.problem import tilting_curve

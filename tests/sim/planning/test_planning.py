@@ -56,18 +56,6 @@ def test_a_robust_plan_says_how_much_of_the_set_it_serves(tmp_path, capsys):
     assert 1.1 < content["duration_s"] < 1.15
 
 
-def test_a_plan_can_be_limited_in_force_rate(tmp_path, capsys):
-    code, content = planned(tmp_path, "box-tilt", "--force-rate", "20")
-    assert code == 0
-    assert "force rate of left" in capsys.readouterr().out
-    assert content["margins"]["force_rate"] == 20.0
-    # Both ends of 19 intervals, and the rests before and after them.
-    assert np.shape(content["stations"]["wrench_contact_axes"]) == (1, 40, 4, 6)
-    assert content["stations"]["acceleration_rad_s2"][-2:] == [0.0, 0.0]
-    # The plan without this limit takes 1.07 s on this grid.
-    assert 1.1 < content["duration_s"] < 1.3
-
-
 def test_a_plan_can_be_stretched(tmp_path):
     _, content = planned(tmp_path, "box-tilt", "--stretch", "2")
     assert 2.0 < content["duration_s"] < 2.3

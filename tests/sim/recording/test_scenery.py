@@ -5,7 +5,7 @@ import re
 import rerun as rr
 
 from fulcrum.scenarios import scenario
-from fulcrum.sim.model.robot import RobotModel
+from fulcrum.sim.model.robot_model import RobotModel
 from fulcrum.sim.recording.scenery import Scenery
 from tests.helpers.models import driving, foreign, with_elbow, written
 from tests.helpers.recordings import Content

@@ -13,7 +13,7 @@ from scipy.spatial.transform import Rotation
 
 from fulcrum.scenarios import scenario, scenarios
 from fulcrum.sim.model.object_path import ScrewPath
-from fulcrum.sim.model.robot import RobotModel
+from fulcrum.sim.model.robot_model import RobotModel
 from fulcrum.sim.motion.schedule import Schedule
 from fulcrum.sim.run.assembly import closed_loop
 from fulcrum.sim.run.environment import make_environment

@@ -16,7 +16,7 @@ from fulcrum.scenarios import scenarios
 from fulcrum.sim.run.execute import Request, Result, execute
 from fulcrum.sim.scenario.phases import Phase
 from fulcrum.sim.sweep.farm import Outcome
-from fulcrum.sim.sweep.summary import Cause, Score
+from fulcrum.sim.sweep.summary import FailureCause, Score
 from fulcrum.synthesis import InfeasibleError, InvalidInputError, Objective, Synthesizer
 from fulcrum.synthesis.markdown import escaped, number, table
 from tests.helpers import problems
@@ -173,7 +173,7 @@ def test_a_plan_shows_duration_and_limits():
 
 
 def test_a_sweep_shows_rates_and_causes():
-    cause = Cause("slip of left", 3, 0.3, "fulcrum run x")
+    cause = FailureCause("slip of left", 3, 0.3, "fulcrum run x")
     score = Score("margin", 10, 7, 0.7, 0.348, 0.933, 6, 34.1, 36.0, (cause,))
     text = shown(Outcome(pa.table({}), (score,)))
     found = cells(text)

@@ -11,7 +11,7 @@ import pytest
 from fulcrum.assets import asset_path
 from fulcrum.scenarios import scenario
 from fulcrum.sim.geometry.geom import Geom
-from fulcrum.sim.model.robot import pinocchio_model
+from fulcrum.sim.model.robot_model import pinocchio_model
 from fulcrum.sim.model.scene import compose
 from fulcrum.sim.motion.schedule import Schedule
 from fulcrum.sim.run.environment import make_environment

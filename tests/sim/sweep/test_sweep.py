@@ -19,8 +19,9 @@ from distributed import LocalCluster
 
 from fulcrum.scenarios import scenarios
 from fulcrum.scenarios.cli import main
+from fulcrum.sim.run.workers import Workers
 from fulcrum.sim.sweep.design import Sweep
-from fulcrum.sim.sweep.farm import LostEpisodesError, Workers, run_sweep
+from fulcrum.sim.sweep.farm import LostEpisodesError, run_sweep
 from fulcrum.sim.sweep.store import Store
 from fulcrum.sim.world.world import World
 from fulcrum.synthesis import InvalidInputError

@@ -16,8 +16,8 @@ from fulcrum.synthesis import (
     Synthesizer,
 )
 from fulcrum.synthesis.analysis.relaxation import (
+    ChangeOutcome,
     Kind,
-    Outcome,
     _confirmed,
     _with_grip,
     change,
@@ -58,7 +58,7 @@ GRIP = SYNTHESIZER.solve(lift_off()).value
 def test_box_is_lifted_with_101_newtons_and_so_is_any_weight():
     assert pytest.approx(101.1, abs=0.1) == GRIP
     weight = change_of(Kind.WEIGHT, lift_off())
-    assert (weight.outcome, weight.factor) == (Outcome.ALWAYS, math.inf)
+    assert (weight.outcome, weight.factor) == (ChangeOutcome.ALWAYS, math.inf)
     assert weight.confirmed_within == 0.0
 
 
@@ -83,14 +83,14 @@ def test_weight_that_a_grip_limit_allows_is_proportional_to_it(f_n_max):
 
 
 def test_torque_limits_are_absent_without_joints():
-    assert change_of(Kind.TORQUE, lift_off()).outcome is Outcome.ABSENT
-    assert change_of(Kind.GRIP, lift_off()).outcome is Outcome.ABSENT
+    assert change_of(Kind.TORQUE, lift_off()).outcome is ChangeOutcome.ABSENT
+    assert change_of(Kind.GRIP, lift_off()).outcome is ChangeOutcome.ABSENT
 
 
 def test_frictionless_contacts_have_no_friction_to_change():
     contacts = tuple(replace(c, model=ContactModel.FRICTIONLESS) for c in lift_off().contacts)
     friction = change_of(Kind.FRICTION, replace(lift_off(), contacts=contacts))
-    assert friction.outcome is Outcome.ABSENT
+    assert friction.outcome is ChangeOutcome.ABSENT
 
 
 # --- the cylinder ---
@@ -108,7 +108,7 @@ def test_cylinder_lift_off_takes_a_grip_of_1697_newtons():
 
 def test_cylinder_lift_off_is_helped_by_no_friction():
     friction = change_of(Kind.FRICTION, cylinder(0.0, environment=False))
-    assert friction.outcome is Outcome.NEVER
+    assert friction.outcome is ChangeOutcome.NEVER
     assert friction.factor > 1000.0
     assert friction.conflict.proves(1e3)
 
@@ -136,7 +136,7 @@ def test_every_border_is_confirmed_by_solving_again(make, seed):
         largest = found.factor * max(c.mu for c in problem.contacts)
         if found.kind is not Kind.FRICTION or largest < 10.0:
             assert found.confirmed_within <= 1e-4, found.kind
-        if found.outcome is Outcome.NEVER:
+        if found.outcome is ChangeOutcome.NEVER:
             assert found.conflict.proves(1e3)
 
 
@@ -167,7 +167,7 @@ def test_borders_are_the_reference_s(problem):
     weight = change_of(Kind.WEIGHT, problem).factor
     assert feasible(heavier(0.999 * weight)) and not feasible(heavier(1.001 * weight))
     found = change_of(Kind.FRICTION, problem)
-    if found.outcome is Outcome.BOUND:
+    if found.outcome is ChangeOutcome.BOUND:
         assert feasible(shrink_cones(problem, 1.001 * found.factor))
         assert not feasible(shrink_cones(problem, 0.999 * found.factor))
 
@@ -192,12 +192,12 @@ def test_preload_beyond_a_torque_limit_is_helped_by_no_weight():
     hands = tuple(replace(c, f_n_min=10.0) for c in box(85.0).contacts[:2])
     problem = replace(box(85.0, joints=joints), contacts=(*hands, *box(85.0).contacts[2:]))
     weight = change_of(Kind.WEIGHT, problem)
-    assert weight.outcome is Outcome.NEVER
+    assert weight.outcome is ChangeOutcome.NEVER
     assert weight.conflict.proves(1e3)
     with pytest.raises(InfeasibleError) as error:
         weight_range(problem, weight_of(problem), SYNTHESIZER)
     assert error.value.certificate.proves(1e3)
-    assert change_of(Kind.FRICTION, problem).outcome is Outcome.NEVER
+    assert change_of(Kind.FRICTION, problem).outcome is ChangeOutcome.NEVER
     assert change_of(Kind.TORQUE, problem).factor == pytest.approx(2.0, rel=EXACT)
 
 

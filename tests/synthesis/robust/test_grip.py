@@ -7,12 +7,13 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from fulcrum.synthesis import InvalidInputError, Objective, RobustInfeasibleError, Synthesizer
-from fulcrum.synthesis.reference import ReferenceInfeasibleError, solve_robust_reference
-from fulcrum.synthesis.robust.certificate import RobustCertificate
+from fulcrum.synthesis import InvalidInputError, Objective, Synthesizer
+from fulcrum.synthesis.reference import ReferenceInfeasibleError
+from fulcrum.synthesis.robust.certificate import RobustCertificate, RobustInfeasibleError
 from fulcrum.synthesis.robust.grip import robust_grip
 from fulcrum.synthesis.robust.uncertainty_set import UncertaintySet
 from tests.helpers.problems import arms, box, random_feasible, random_infeasible
+from tests.helpers.robust_reference import solve_robust_reference
 from tests.helpers.worlds import gravity_of, gripped, is_served, member
 
 GRIP_OBJECTIVES = (Objective.MAX_NORMAL_FORCE, Objective.NORM_NORMAL_FORCE)

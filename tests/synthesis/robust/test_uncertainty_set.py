@@ -10,7 +10,8 @@ from hypothesis import strategies as st
 from scipy.optimize import linprog
 from scipy.spatial.transform import Rotation
 
-from fulcrum.synthesis import InvalidInputError, RobustInfeasibleError
+from fulcrum.synthesis import InvalidInputError
+from fulcrum.synthesis.robust.certificate import RobustInfeasibleError
 from fulcrum.synthesis.robust.grip import robust_grip
 from fulcrum.synthesis.robust.scaling import largest_scaling
 from fulcrum.synthesis.robust.uncertainty_set import UncertaintySet

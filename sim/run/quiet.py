@@ -1,4 +1,4 @@
-"""What Dask loads first into each worker of a sweep's own cluster: Ctrl-C is the driver's alone."""
+"""What Dask loads first into each worker of a cluster of our own: Ctrl-C is the driver's alone."""
 
 from __future__ import annotations
 

@@ -1,0 +1,35 @@
+"""The scenarios that ship, and those of files, by name."""
+
+from __future__ import annotations
+
+from functools import cache
+from pathlib import Path
+
+from fulcrum.scenarios.reading.file import named_file, read, scene_files
+from fulcrum.scenarios.reading.scene import check_scene
+from fulcrum.sim.scenario.scenario import Scenario
+
+
+@cache
+def scenarios() -> dict[str, Scenario]:
+    """All scenarios that ship, by name."""
+    return {name: read(file) for name, file in scene_files().items()}
+
+
+def scenario(name_or_file: str, allowed: tuple[Path, ...] = ()) -> Scenario:
+    """The scenario that ships under a name, or that of a file, which is named as the file.
+
+    Args:
+        name_or_file: Its name, or its file's, which ends in ``.toml``.
+        allowed: Folders besides its own from which a file may have others read.
+
+    Raises:
+        InvalidInputError: There is none of that name, or the file is not valid.
+    """
+    known = scenarios()
+    if name_or_file in known:
+        return known[name_or_file]
+    file = named_file("scenario", name_or_file)
+    found = read(file, allowed)
+    check_scene(file, found)
+    return found
