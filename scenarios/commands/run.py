@@ -11,6 +11,7 @@ from fulcrum.scenarios.commands.common import (
     INTERRUPTED,
     PASSED,
     Chosen,
+    check_results_folder,
     chosen_control,
     chosen_planning,
     progress_bar,
@@ -96,19 +97,20 @@ class Run(Chosen):
         codes = {Verdict.PASS: PASSED, Verdict.FAIL: FAILED, Verdict.INTERRUPTED: INTERRUPTED}
         return codes[report.verdict]
 
-    def _request(self) -> tuple[Request, Preparation | None]:
-        """What to run, and what is prepared of it: a planned tilt, if there is to be one."""
+    def _request(self) -> tuple[Request, Preparation]:
+        """Return what to run, and what is prepared of it."""
         from fulcrum.scenarios.commands.sweep import drawn_world
         from fulcrum.sim.planning.execution import planned_tilt
         from fulcrum.sim.run.execute import Request
-        from fulcrum.sim.run.preparation import Preparation
+        from fulcrum.sim.run.preparation import Preparation, prepare
         from fulcrum.sim.scenario.control import default_controller
         from fulcrum.sim.scenario.phases import stretched
         from fulcrum.synthesis.errors import InvalidInputError
 
+        check_results_folder(self.out)
         chosen = self.chosen()
         asked = self.plan, self.stretch, self.duration, self.robust
-        planning, prepared = chosen_planning(chosen, *asked), None
+        planning = chosen_planning(chosen, *asked)
         controller = default_controller(planning is not None)
         if self.controller is not None:
             controller = self.controller
@@ -123,6 +125,9 @@ class Run(Chosen):
         if self.anyway:
             control = replace(control, best_effort=True)
         world = drawn_world(chosen, self.preset, self.seed, self.world)
+        if planning is None:
+            prepared = prepare(chosen, control, check=not self.anyway)
+        # Nothing is written before the run is known to be possible.
         out = results_folder(self.out, f"{chosen.name}-{controller}")
         request = Request(
             chosen, controller, control, self.seed, out, self.live, self.anyway, world, planning
