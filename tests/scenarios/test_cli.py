@@ -30,7 +30,6 @@ HEAVY = (
 )
 
 BAD = {
-    "no command": "",
     "unknown command": "tilt box-tilt",
     "unknown flag": "run box-tilt --speed 3",
     "flag without value": "run box-tilt --duration",
@@ -127,7 +126,7 @@ def test_bad_input_gives_exit_code_2_one_line_and_no_files(case, place, capsys):
     assert contents(place) == before
 
 
-@pytest.mark.parametrize("case", ["no command", "duration too short for the arms"])
+@pytest.mark.parametrize("case", ["unknown command", "duration too short for the arms"])
 def test_the_process_itself_ends_with_code_2_and_one_line(case, place):
     before = contents(place)
     done = fulcrum(*BAD[case].split(), cwd=place)
