@@ -10,6 +10,7 @@ import tempfile
 from collections.abc import Iterator, Mapping
 from dataclasses import replace
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from fulcrum.scenarios import scenario as named_scenario
 from fulcrum.scenarios.commands.common import asked_planning, one_of
@@ -23,6 +24,7 @@ from fulcrum.sim.planning.execution import made_plan, planned_tilt
 from fulcrum.sim.planning.path_problems import PathProblems
 from fulcrum.sim.planning.plan import Plan
 from fulcrum.sim.planning.problem import own_margins
+from fulcrum.sim.run import environment
 from fulcrum.sim.run.execute import Request, Result, execute
 from fulcrum.sim.run.preparation import Preparation
 from fulcrum.sim.scenario.control import (
@@ -37,6 +39,9 @@ from fulcrum.sim.sweep.farm import LOCAL, Outcome, Workers, run_sweep
 from fulcrum.sim.world import presets
 from fulcrum.sim.world.parameters import Grid, overridden, parameter_name
 from fulcrum.synthesis import Synthesizer
+
+if TYPE_CHECKING:
+    from dm_control.rl.control import Environment
 
 Asked = Scenario | str | Path
 
@@ -124,6 +129,23 @@ def sweep(
     design = Sweep(scene, names, preset, episodes, seed, grid, called=called)
     with _folder(out) as folder:
         return run_sweep(design, folder, workers)
+
+
+def make_environment(
+    scenario: Asked, seed: int = 0, control_timestep: float | None = None
+) -> Environment:
+    """Return the scenario as a `dm_env` environment: joint torques in, states and forces out.
+
+    Args:
+        scenario: The scene.
+        seed: Draws the deviations of the start posture.
+        control_timestep: Time between actions [s]; that of the synthesis if left out.
+
+    Raises:
+        InvalidInputError: The time between actions is no multiple of the physics step.
+        PathError: The arms cannot follow the path.
+    """
+    return environment.make_environment(_scene(scenario), seed, control_timestep)
 
 
 def check(scenario: Asked, controller: str = "robust") -> Feasibility:

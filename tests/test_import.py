@@ -108,7 +108,8 @@ def test_run_writes_its_record(tmp_path):
     assert result.report.verdict == "pass"
 
 
-def test_the_questions_take_names():
+def test_the_environment_and_the_questions_take_names():
+    assert fulcrum.make_environment("box-tilt").control_timestep() == pytest.approx(0.004)
     assert fulcrum.plan("box-tilt").duration == pytest.approx(1.04, abs=0.005)  # as in the README
     assert not fulcrum.explain("box-lift").feasible
     assert [round(found.weight, 1) for found in fulcrum.capacity("box-tilt")] == [44.4, 12.0]

@@ -24,7 +24,10 @@ COMMANDS = {
     "run": ("run mine.toml --controller margin --out run", "PASS"),
     "plan": ("plan box-tilt --out planned", "plan.json"),
     "sweep": ("sweep mine.toml --episodes 1 --controllers margin --workers 1 --out many", "100.0"),
-    "place": ("place box-tilt --evaluations 8 --keep hands --reach 0.05", "goal largest-margin"),
+    "place": (
+        "place box-tilt --evaluations 8 --workers 1 --keep hands --reach 0.05",
+        "goal largest-margin",
+    ),
 }
 
 

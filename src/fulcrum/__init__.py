@@ -12,8 +12,16 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from fulcrum import assets, scenarios, sim, synthesis
     from fulcrum.scenarios import scenario
-    from fulcrum.scenarios.functions import capacity, check, explain, place, plan, run, sweep
-    from fulcrum.sim.run.environment import make_environment
+    from fulcrum.scenarios.functions import (
+        capacity,
+        check,
+        explain,
+        make_environment,
+        place,
+        plan,
+        run,
+        sweep,
+    )
     from fulcrum.sim.run.execute import Request
     from fulcrum.sim.world.presets import draw, preset
     from fulcrum.sim.world.world import World
@@ -50,7 +58,7 @@ _MODULES = {
     "check": "fulcrum.scenarios.functions",
     "draw": "fulcrum.sim.world.presets",
     "explain": "fulcrum.scenarios.functions",
-    "make_environment": "fulcrum.sim.run.environment",
+    "make_environment": "fulcrum.scenarios.functions",
     "place": "fulcrum.scenarios.functions",
     "plan": "fulcrum.scenarios.functions",
     "preset": "fulcrum.sim.world.presets",
