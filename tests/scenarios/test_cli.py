@@ -1,5 +1,6 @@
 """The command line: exit codes, one clear line for bad input, and no files left by it."""
 
+import os
 import subprocess
 import sys
 from pathlib import Path
@@ -104,7 +105,7 @@ def contents(folder):
 
 def fulcrum(*arguments, cwd=ROOT):
     command = [sys.executable, "-m", "fulcrum.scenarios.cli", *arguments]
-    environment = {"PYTHONPATH": str(ROOT), "PATH": "", "HOME": str(cwd)}
+    environment = {"PYTHONPATH": f"{ROOT / 'src'}{os.pathsep}{ROOT}", "PATH": "", "HOME": str(cwd)}
     return subprocess.run(
         command, check=False, cwd=cwd, env=environment, capture_output=True, text=True
     )
