@@ -1,4 +1,7 @@
-PYTHON ?= python3.11
+# The first that is there, of a version that every package has wheels for, and can make environments.
+USABLE := import sys, ensurepip, venv; sys.exit(not (3, 11) <= sys.version_info[:2] <= (3, 12))
+PYTHON ?= $(firstword $(foreach name,python3.11 python3.12 python3,\
+	$(shell $(name) -c "$(USABLE)" >/dev/null 2>&1 && echo $(name))))
 BIN := .venv/bin
 STAMP := .venv/.installed
 BENCH_STAMP := .venv/.installed-bench
@@ -40,6 +43,8 @@ assets: $(STAMP)
 	$(BIN)/python -m fulcrum.scenarios.scene_files
 
 $(STAMP): pyproject.toml constraints.txt
+	@test -n "$(PYTHON)" || { echo "fulcrum needs Python 3.11 or 3.12 with its module venv:" \
+		"install one, or name it: make PYTHON=/path/to/python3.12" >&2; exit 1; }
 	$(PYTHON) -m venv .venv
 	$(BIN)/pip install --quiet --disable-pip-version-check -c constraints.txt -e ".[dev]"
 	touch $@

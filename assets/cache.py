@@ -22,7 +22,10 @@ def cached(key: str, make: Callable[[], list[NDArray]]) -> list[NDArray]:
         key: A digest; names the file.
         make: Makes the arrays where the cache has none, or a damaged file.
     """
-    path = folder() / f"{key}.npz"
+    kept_in = folder()
+    if kept_in is None:
+        return make()
+    path = kept_in / f"{key}.npz"
     unusable = contextlib.suppress(OSError, ValueError, EOFError, zipfile.BadZipFile)
     with unusable, np.load(path) as stored:
         return [stored[name] for name in stored.files]
@@ -36,6 +39,10 @@ def cached(key: str, make: Callable[[], list[NDArray]]) -> list[NDArray]:
     return arrays
 
 
-def folder() -> Path:
-    """The cache folder of the XDG base directory specification."""
-    return Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "fulcrum"
+def folder() -> Path | None:
+    """Return the cache folder of the XDG base directory specification; None without a home."""
+    root = os.environ.get("XDG_CACHE_HOME")
+    try:
+        return Path(root or Path.home() / ".cache") / "fulcrum"
+    except RuntimeError:  # an unknown user, and no HOME
+        return None

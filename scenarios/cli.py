@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import contextlib
 import io
+import platform
 import re
 import sys
+import traceback
 from collections.abc import Sequence
 from typing import Annotated
 
@@ -14,7 +16,9 @@ import tyro
 from fulcrum.scenarios.commands.check import CheckCommand
 from fulcrum.scenarios.commands.common import (
     BAD_INPUT,
+    BUG,
     INTERRUPTED,
+    PASSED,
     Chosen,
 )
 from fulcrum.scenarios.commands.explain import CapacityCommand, ExplainCommand
@@ -47,12 +51,16 @@ AnyCommand = (
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Runs a command; returns the exit code.
+    """Run a command; return the exit code.
 
-    0 pass, 1 failed its checks, 2 bad input, 130 interrupted.
+    0 pass, 1 failed its checks, 2 bad input, 70 a bug, 130 interrupted.
     """
+    arguments = sys.argv[1:] if arguments is None else arguments
     command = None
     try:
+        if list(arguments) == ["--version"]:
+            print(_versions())
+            return PASSED
         command = _parse(arguments)
         return command.execute()
     except KeyboardInterrupt:  # a run that has begun catches it itself
@@ -62,20 +70,24 @@ def main(arguments: Sequence[str] | None = None) -> int:
         from fulcrum.synthesis.errors import FulcrumError
 
         if not isinstance(error, (FulcrumError, OSError)):
-            raise
+            traceback.print_exc()
+            print("fulcrum: this is a bug; please report the lines above.", file=sys.stderr)
+            return BUG
         text = command.told(error) if isinstance(command, Chosen) else str(error)
         print(f"fulcrum: {' '.join(text.split())}", file=sys.stderr)
         return BAD_INPUT
 
 
 def _parse(
-    arguments: Sequence[str] | None,
+    arguments: Sequence[str],
 ) -> AnyCommand:
-    """The command asked for; a parse error leaves as one line instead of tyro's box."""
+    """Return the command asked for, with none the help; a parse error becomes one line."""
     errors = io.StringIO()
     try:
         with contextlib.redirect_stderr(errors):
-            return tyro.cli(AnyCommand, prog="fulcrum", description=_DESCRIPTION, args=arguments)
+            return tyro.cli(
+                AnyCommand, prog="fulcrum", description=_DESCRIPTION, args=arguments or ["--help"]
+            )
     except SystemExit as stop:
         if stop.code == 0:
             raise
@@ -88,8 +100,23 @@ def _parse(
 
 _DESCRIPTION = (
     "Robots move objects too heavy to lift by leaning them on their surroundings: contact force "
-    "synthesis in a MuJoCo closed loop, recorded and checked."
+    "synthesis in a MuJoCo closed loop, recorded and checked. `fulcrum --version` prints the "
+    "versions of fulcrum and of what its numbers depend on."
 )
+# Whose versions a report of a bug needs.
+_PACKAGES = ("mujoco", "dm-control", "clarabel", "pin", "mink", "rerun-sdk")
+
+
+def _versions() -> str:
+    """Return the versions of fulcrum, Python and the packages that do the work, one a line."""
+    from importlib.metadata import version
+
+    import fulcrum
+
+    own = {"fulcrum": fulcrum.__version__, "Python": platform.python_version()}
+    return "\n".join(
+        f"{name} {number}" for name, number in (own | {p: version(p) for p in _PACKAGES}).items()
+    )
 
 
 if __name__ == "__main__":

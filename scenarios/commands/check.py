@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import math
+import sys
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -13,6 +14,7 @@ from fulcrum.scenarios.commands.common import (
     PASSED,
     Chosen,
     check_json,
+    check_results_folder,
     chosen_control,
     results_folder,
 )
@@ -47,11 +49,12 @@ class CheckCommand(Chosen):
         from fulcrum.sim.analysis.feasibility import feasibility
         from fulcrum.sim.analysis.picture import draw
         from fulcrum.sim.run.files import write_json
+        from fulcrum.synthesis.errors import InvalidInputError
 
         check_json(self.json)
         chosen = self.chosen()
         control = chosen_control(chosen, self.controller, None)
-        out = results_folder(self.out, f"{chosen.name}-check")
+        check_results_folder(self.out)
         found = feasibility(chosen, control)
         console = Console(highlight=False)
         _print(console, chosen, self.controller, found)
@@ -61,11 +64,18 @@ class CheckCommand(Chosen):
             print_explanation(console, found.explanation, self.controller)
         if found.unreachable is not None:
             console.print(self._help(found), soft_wrap=True, markup=False)
-        out.mkdir(parents=True, exist_ok=True)
-        draw(chosen, self.controller, found, out / PICTURE)
         content = {"scenario": chosen.name, "controller": self.controller, **_content(found)}
-        write_json(self.json or out / RESULT, content)
-        print(f"figure and numbers: {out}")
+        if self.json is not None:
+            write_json(self.json, content)
+        try:
+            out = results_folder(self.out, f"{chosen.name}-check")
+        except InvalidInputError as error:  # the answer stands above
+            print(f"fulcrum: figure and numbers are not written: {error}", file=sys.stderr)
+        else:
+            draw(chosen, self.controller, found, out / PICTURE)
+            if self.json is None:
+                write_json(out / RESULT, content)
+            print(f"figure and numbers: {out}")
         return PASSED if found.feasible else FAILED
 
     def _help(self, found: Feasibility) -> str:

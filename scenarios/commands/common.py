@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
 Choice = TypeVar("Choice", bound=StrEnum)
 
-PASSED, FAILED, BAD_INPUT, INTERRUPTED = 0, 1, 2, 130
+PASSED, FAILED, BAD_INPUT, BUG, INTERRUPTED = 0, 1, 2, 70, 130
 
 
 @dataclass(frozen=True)
@@ -175,19 +175,44 @@ def check_json(path: Path | None) -> None:
         raise InvalidInputError("--json", str(path), "a file in a folder that exists")
 
 
-def results_folder(out: Path | None, name: str) -> Path:
-    """The folder asked for, if results may be written there; logs/NAME-TIME if none is.
+def check_results_folder(out: Path | None) -> None:
+    """Refuse, before the work is done, a folder that cannot take the results.
 
     Raises:
-        InvalidInputError: It is not empty, or cannot be a folder.
+        InvalidInputError: It is not empty, or cannot be a folder, or must not be written to.
     """
     from fulcrum.sim.run.files import check_new_folder
 
-    folder = out or dated_folder(name)
-    check_new_folder("--out", folder)
+    if out is not None:
+        check_new_folder("--out", out)
+
+
+def results_folder(out: Path | None, name: str) -> Path:
+    """Make the folder asked for, or logs/NAME-TIME, which no other process has.
+
+    Raises:
+        InvalidInputError: It is not empty, or cannot be made.
+    """
+    from fulcrum.sim.run.files import check_new_folder, claim_folder
+    from fulcrum.synthesis.errors import InvalidInputError
+
+    folder = out or Path("logs") / f"{name}-{datetime.now():%Y%m%d-%H%M%S}"
+    try:
+        if out is None:
+            return claim_folder(folder)
+        check_new_folder("--out", folder)
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        given = f"{folder} ({error.strerror})"
+        raise InvalidInputError("--out", given, "a folder that can be written to") from None
     return folder
 
 
-def dated_folder(name: str) -> Path:
-    """logs/NAME-TIME."""
-    return Path("logs") / f"{name}-{datetime.now():%Y%m%d-%H%M%S}"
+@contextlib.contextmanager
+def removed_if_empty(folder: Path) -> Iterator[None]:
+    """Remove a folder in the end if nothing was written to it."""
+    try:
+        yield
+    finally:
+        with contextlib.suppress(OSError):  # it is gone, or holds something
+            folder.rmdir()

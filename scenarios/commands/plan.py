@@ -7,7 +7,14 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from fulcrum.scenarios.commands.common import FAILED, PASSED, Chosen, asked_planning, results_folder
+from fulcrum.scenarios.commands.common import (
+    FAILED,
+    PASSED,
+    Chosen,
+    asked_planning,
+    check_results_folder,
+    results_folder,
+)
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -83,13 +90,13 @@ class PlanCommand(Chosen):
             self.points,
         )
         margins = self._margins(chosen)
-        out = results_folder(self.out, f"{chosen.name}-plan")
+        check_results_folder(self.out)
         try:
             planned = made_plan(chosen, margins, planning)
         except PlanError as error:
             print(error)
             return FAILED
-        out.mkdir(parents=True, exist_ok=True)
+        out = results_folder(self.out, f"{chosen.name}-plan")
         write_json(out / PLAN, plan_content(planned))
         draw(planned, out / PICTURE)
         _print(Console(highlight=False), planned)

@@ -34,7 +34,6 @@ class ReproduceCommand:
         from fulcrum.scenarios.paper.reproduce import STEPS, reproduce
 
         out = results_folder(self.out, "reproduce")
-        out.mkdir(parents=True, exist_ok=True)
         console = Console(stderr=True)
         done = 0
 

@@ -11,6 +11,7 @@ from fulcrum.scenarios.commands.common import (
     INTERRUPTED,
     PASSED,
     Chosen,
+    check_results_folder,
     chosen_control,
     chosen_planning,
     progress_bar,
@@ -96,8 +97,8 @@ class RunCommand(Chosen):
         codes = {Verdict.PASS: PASSED, Verdict.FAIL: FAILED, Verdict.INTERRUPTED: INTERRUPTED}
         return codes[report.verdict]
 
-    def _request(self) -> tuple[Request, Preparation | None]:
-        """What to run, and what is prepared of it: a planned tilt, if there is to be one."""
+    def _request(self) -> tuple[Request, Preparation]:
+        """Return what to run, and what is prepared of it."""
         from fulcrum.scenarios.commands.sweep import drawn_world
         from fulcrum.sim.run.execute import Request
         from fulcrum.sim.run.preparation import prepare
@@ -105,22 +106,23 @@ class RunCommand(Chosen):
         from fulcrum.sim.scenario.phases import stretched
         from fulcrum.synthesis.errors import InvalidInputError
 
+        check_results_folder(self.out)
         chosen = self.chosen()
         asked = self.plan, self.stretch, self.duration, self.robust
-        planning, prepared = chosen_planning(chosen, *asked), None
+        planning = chosen_planning(chosen, *asked)
         controller = default_controller(planning is not None)
         if self.controller is not None:
             controller = self.controller
         control = chosen_control(chosen, controller, self.objective)
-        if planning is not None:
-            prepared = prepare(chosen, control, planning=planning)
-            assert prepared.execution is not None
-            chosen = prepared.execution.scenario
-        elif self.duration is not None:
-            chosen = replace(chosen, phases=stretched(chosen.phases, self.duration))
         if self.seed < 0:
             raise InvalidInputError("--seed", self.seed, "an integer >= 0")
+        if planning is None and self.duration is not None:
+            chosen = replace(chosen, phases=stretched(chosen.phases, self.duration))
+        prepared = prepare(chosen, control, self.best_effort, planning=planning)
+        if prepared.execution is not None:
+            chosen = prepared.execution.scenario
         world = drawn_world(chosen, self.preset, self.seed, self.world)
+        # Nothing is written before the run is known to be possible.
         out = results_folder(self.out, f"{chosen.name}-{controller}")
         how = self.seed, out, self.live, self.best_effort
         return Request(chosen, controller, control, *how, world, planning), prepared

@@ -16,8 +16,9 @@ from fulcrum.scenarios.commands.common import (
     PASSED,
     Chosen,
     chosen_planning,
-    dated_folder,
     progress_bar,
+    removed_if_empty,
+    results_folder,
 )
 
 if TYPE_CHECKING:
@@ -93,11 +94,11 @@ class SweepCommand(Chosen):
             print(error)
             return FAILED
         pair = self._map(sweep)
-        folder = self.out or dated_folder(f"sweep-{sweep.scenario.name}-{self.preset}")
+        folder = self.out or results_folder(None, f"sweep-{sweep.scenario.name}-{self.preset}")
         store = Store(sweep, folder)
         before, started = len(store.missing()), time.perf_counter()
         try:
-            with progress_bar(sweep.scenario.name) as move:
+            with removed_if_empty(folder), progress_bar(sweep.scenario.name) as move:
                 outcome = run_sweep(
                     sweep,
                     folder,
@@ -144,7 +145,7 @@ class SweepCommand(Chosen):
 
     def _sweep(self) -> Sweep:
         from fulcrum.sim.planning.execution import planned_tilt
-        from fulcrum.sim.scenario.control import controllers
+        from fulcrum.sim.scenario.control import comparable
         from fulcrum.sim.sweep.design import Sweep
         from fulcrum.sim.world.parameters import parse_grid
 
@@ -154,14 +155,12 @@ class SweepCommand(Chosen):
         if planning is not None:
             chosen = planned_tilt(chosen, planning).scenario
         if self.controllers is None:
-            known = controllers(chosen.control)
-            fast = planning is not None
-            names = [n for n, c in known.items() if c.feedforward and c.inertia is fast]
+            names = comparable(chosen.control, planned=planning is not None)
         else:
-            names = [name.strip() for name in self.controllers.split(",")]
+            names = tuple(name.strip() for name in self.controllers.split(","))
         return Sweep(
             scenario=chosen,
-            controllers=tuple(names),
+            controllers=names,
             preset=self.preset,
             episodes=self.episodes,
             seed=self.seed,

@@ -16,7 +16,7 @@ def scenarios() -> dict[str, Scenario]:
     return {name: read(file) for name, file in scene_files().items()}
 
 
-def scenario(name_or_file: str, allowed: tuple[Path, ...] = ()) -> Scenario:
+def scenario(name_or_file: str | Path, allowed: tuple[Path, ...] = ()) -> Scenario:
     """The scenario that ships under a name, or that of a file, which is named as the file.
 
     Args:
@@ -26,10 +26,10 @@ def scenario(name_or_file: str, allowed: tuple[Path, ...] = ()) -> Scenario:
     Raises:
         InvalidInputError: There is none of that name, or the file is not valid.
     """
-    known = scenarios()
-    if name_or_file in known:
-        return known[name_or_file]
-    file = named_file("scenario", name_or_file)
+    known, name = scenarios(), str(name_or_file)
+    if name in known:
+        return known[name]
+    file = named_file("scenario", name)
     found = read(file, allowed)
     check_scene(file, found)
     return found

@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import contextlib
+import itertools
 import json
 import math
+import os
 from pathlib import Path
 from typing import Any
 
@@ -11,10 +14,24 @@ from fulcrum.synthesis import InvalidInputError
 
 
 def check_new_folder(field: str, out: Path) -> None:
-    """Refuses a folder that is not empty, or that cannot be made."""
+    """Refuse a folder that is not empty, or that cannot be made."""
     nearest = next(path for path in (out, *out.absolute().parents) if path.exists())
     if not nearest.is_dir() or (out.exists() and any(out.iterdir())):
         raise InvalidInputError(field, str(out), "a new or empty folder")
+    if not os.access(nearest, os.W_OK | os.X_OK):
+        given = f"{out}, where nothing may be written"
+        raise InvalidInputError(field, given, "a folder that may be written to")
+
+
+def claim_folder(folder: Path) -> Path:
+    """Make a folder that no other process has, with -2, -3, .. behind its name if need be."""
+    folder.parent.mkdir(parents=True, exist_ok=True)
+    for number in itertools.count(1):
+        claimed = folder if number == 1 else folder.with_name(f"{folder.name}-{number}")
+        with contextlib.suppress(FileExistsError):
+            claimed.mkdir()
+            return claimed
+    raise AssertionError("an endless count has ended")
 
 
 def write_json(path: Path, content: Any) -> None:

@@ -165,3 +165,9 @@ def controller(control: Control, name: str, field: str = "controller") -> Contro
 def default_controller(planned: bool) -> str:
     """The controller that suits: only ``dynamic`` counts with the inertia of a planned tilt."""
     return "dynamic" if planned else "robust"
+
+
+def comparable(control: Control, planned: bool) -> tuple[str, ...]:
+    """Return the controllers with feed-forward that suit: with inertia for a planned tilt."""
+    known = controllers(control).items()
+    return tuple(name for name, c in known if c.feedforward and c.inertia is planned)

@@ -1,4 +1,4 @@
-"""`python -m fulcrum`."""
+"""Run the command line: ``python -m fulcrum``."""
 
 import sys
 

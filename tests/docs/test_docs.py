@@ -19,6 +19,7 @@ from markdown_it import MarkdownIt
 from fulcrum.scenarios import scenarios
 from fulcrum.scenarios.cli import AnyCommand, main
 from fulcrum.sim.scenario.physics import Tolerances
+from fulcrum.sim.sweep.farm import Workers
 from tests.helpers.short_run import short_tilt
 
 ROOT = Path(__file__).parents[2]
@@ -32,13 +33,12 @@ SMALLER = {
     "--episodes 500": "--episodes 1 --controllers margin --scheduler {scheduler}",
     "--episodes 20": "--episodes 1 --scheduler {scheduler}",
     "=0.7:1.3:7,mass=0.8,1.0,1.2": "=0.7",
-    'episodes=20), Path("logs/lab"))': (
-        'episodes=1), Path("logs/lab"), Workers(scheduler="{scheduler}"))'
+    'fulcrum.sweep(box, 20, ("robust", "margin"), preset="lab",': (
+        'fulcrum.sweep(SHORT, 1, ("robust", "margin"), preset="lab", '
+        'workers=Workers(scheduler="{scheduler}"),'
     ),
     "[--stretch 1.5]": "--stretch 1.5",  # so short a tilt in least time is all acceleration
     "--tilt-deg 30": "--tilt-deg 8",
-    "run_sweep(Sweep(box,": "run_sweep(Sweep(SHORT,",
-    "import run_sweep": "import Workers, run_sweep",
     "robust 20\nmargin 20": "robust 1\nmargin 1",
 }
 # What is only parsed, and why.
@@ -135,7 +135,7 @@ def prints(expected, actual):
 
 def perform(found, scheduler=""):
     """Does what the blocks of a page say, one after the other, in the working folder."""
-    names = {"__name__": "__main__", "SHORT": SHORT}
+    names = {"__name__": "__main__", "SHORT": SHORT, "Workers": Workers}
     for block, following in itertools.pairwise([*found, Block("", 0, "", "")]):
         where = f"{block.page}:{block.line}"
         if block.language == "python":

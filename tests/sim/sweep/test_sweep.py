@@ -51,7 +51,7 @@ def flat(content, prefix=""):
 def fulcrum(*arguments):
     """`fulcrum` with a short scene, as the leader of processes of its own."""
     command = [sys.executable, "-m", "tests.helpers.sweeps", *arguments]
-    environment = {**os.environ, "PYTHONPATH": str(ROOT)}
+    environment = {**os.environ, "PYTHONPATH": f"{ROOT / 'src'}{os.pathsep}{ROOT}"}
     return subprocess.Popen(
         command,
         cwd=ROOT,
