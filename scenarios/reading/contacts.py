@@ -9,7 +9,7 @@ import numpy as np
 
 from fulcrum.assets import HANDS
 from fulcrum.scenarios.reading.access import Access
-from fulcrum.scenarios.reading.object import Thing, friction, front
+from fulcrum.scenarios.reading.object import Thing, front
 from fulcrum.scenarios.reading.places import (
     ON_SURFACE,
     direction,
@@ -50,7 +50,7 @@ def make_hand(thing: Thing, name: str, table: HandTable, access: Access) -> Hand
             p_OC_O=point,
             normal_O=normal,
             tangent_O=_tangent(thing.source, key, table.tangent, normal),
-            friction=friction(table.friction),
+            friction=table.friction,
             f_n_max=math.inf if table.grip_limit_n is None else table.grip_limit_n,
             mount_pose=Pose(vector(table.mount_position_m or [0.0] * 3), turn(table.mount_rpy_deg)),
         )
@@ -112,7 +112,7 @@ def make_support(
         p_OP_O=point,
         normal_W=normal,
         tangent_W=_tangent(source, key, table.tangent, normal),
-        friction=friction(surface.friction),
+        friction=surface.friction,
     )
 
 

@@ -13,7 +13,6 @@ from fulcrum.scenarios.schema.tables import (
     AnyObject,
     BoxTable,
     CylinderTable,
-    FrictionTable,
     HollowCylinderTable,
     SurfaceTable,
 )
@@ -22,7 +21,6 @@ from fulcrum.sim.geometry.object import GRAVITY, Object
 from fulcrum.sim.geometry.pose import Pose, Vector
 from fulcrum.sim.geometry.shape import Shape, homogeneous
 from fulcrum.sim.geometry.shapes import Box, Cylinder, HollowCylinder, MeshShape
-from fulcrum.sim.scenario.contacts import Friction
 
 # Spacing of the lines with which MuJoCo draws a plane [m].
 _GRID = 0.05
@@ -143,11 +141,6 @@ def front(surface: SurfaceTable) -> Vector:
     facing = surface.facing or "-x"
     x, y, z = (float(facing == f"+{axis}") - float(facing == f"-{axis}") for axis in "xyz")
     return (x, y, z)
-
-
-def friction(table: FrictionTable) -> Friction:
-    """Friction of a pair of surfaces."""
-    return Friction(table.mu, table.torsion_m)
 
 
 def colour(values: list[float]) -> tuple[float, float, float, float]:

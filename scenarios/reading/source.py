@@ -100,13 +100,17 @@ class Source:
         except FileError:
             raise
         except InvalidInputError as error:
-            name = error.field.rpartition(".")[2]
-            table: Any = self.data
-            for part in key:
-                table = table[part] if _has(table, part) else {}
-            if isinstance(table, dict):
-                key = (*key, *[given for given in table if given.startswith(name)][:1])
-            raise self.error(key, error.given, error.valid) from None
+            raise self.refused(key, error) from None
+
+    def refused(self, key: Key, error: InvalidInputError) -> FileError:
+        """The refusal of a dataclass that is made from the table at a key, as one of the file."""
+        name = error.field.rpartition(".")[2]
+        table: Any = self.data
+        for part in key:
+            table = table[part] if _has(table, part) else {}
+        if isinstance(table, dict):
+            key = (*key, *[given for given in table if given.startswith(name)][:1])
+        return self.error(key, error.given, error.valid)
 
     def line(self, key: Key) -> int | None:
         """Where the statement begins that brings a key, or the table that it is missing from."""
@@ -193,6 +197,8 @@ def explained(source: Source, model: type[BaseModel], error: ValidationError) ->
         found.append((details["type"] != "extra_forbidden", source.line(key) or 0, key, details))
     found.sort(key=lambda item: item[:2])
     _, _, key, details = found[0]
+    if details["type"] == "value_error":
+        return source.refused(key, details["ctx"]["error"])
     given, valid = _sentence(model, details, key)
     if len(found) > 1:
         valid += f" (and {len(found) - 1} more to mend)"

@@ -1,4 +1,4 @@
-"""The scenario file as models: the robots, and the path along which they move the object."""
+"""The scenario file as models: the robots, the path of the object, and the phases along it."""
 
 from __future__ import annotations
 
@@ -7,18 +7,12 @@ from typing import Annotated, Any, Literal
 from annotated_types import Gt, Len, Lt
 from pydantic import Discriminator, Field, Tag
 
-from fulcrum.scenarios.schema.keys import (
-    PREFIX,
-    Corner,
-    Direction,
-    NotNegative,
-    Number,
-    Placed,
-    Positive,
-    Table,
-    Text,
-    Vector3,
-)
+from fulcrum.scenarios.schema.derive import FromTable
+from fulcrum.scenarios.schema.keys import PREFIX, Corner, Direction, Placed, Table, Vector3
+from fulcrum.sim.scenario.phases import REACH, STANDOFF, TILT, Duration, Gap, Phase
+from fulcrum.synthesis.settings import NotNegative, Positive, Text
+
+_APPROACH, _TOUCH, _GRIP = REACH
 
 
 class RobotTable(Placed):
@@ -30,13 +24,13 @@ class RobotTable(Placed):
     prefix: Annotated[str, Field(pattern=PREFIX)] = ""
     """What stands before the names of its bodies and joints; robots of a scene differ in it."""
 
-    posture_deg: dict[str, Number] = {}
+    posture_deg: dict[str, float] = {}
     """Start angles by joint [deg], without the prefix; inverse kinematics seeks from there."""
 
-    posture_rad: dict[str, Number] = {}
+    posture_rad: dict[str, float] = {}
     """The same [rad]; a joint is in one of these tables."""
 
-    posture_m: dict[str, Number] = {}
+    posture_m: dict[str, float] = {}
     """Start positions of sliding joints [m]."""
 
     still: list[str] = []
@@ -58,7 +52,7 @@ class RobotTable(Placed):
     """Standard deviation of the real start posture from the planned one [rad or m]."""
 
 
-Angle = Annotated[Number, Gt(0.0), Lt(180.0)]
+Angle = Annotated[float, Gt(0.0), Lt(180.0)]
 
 
 class TurnTable(Table):
@@ -91,7 +85,7 @@ class ScrewTable(TurnTable):
     kind: Literal["screw"]
     """tilt, screw or poses."""
 
-    pitch_m_per_rad: Number = 0.0
+    pitch_m_per_rad: float = 0.0
     """Advance along the axis [m/rad]."""
 
     travel_m: Vector3 = [0.0, 0.0, 0.0]
@@ -125,3 +119,28 @@ AnyPath = Annotated[
     | Annotated[PosesTable, Tag("poses")],
     Discriminator(_kind),
 ]
+
+
+class ManoeuvreTable(Table):
+    """Timing of the phases: approach, touch, grip, tilt, and what comes then."""
+
+    approach_s: Duration = _APPROACH.duration_s
+    """Duration in which the hands come near [s]."""
+
+    touch_s: Duration = _TOUCH.duration_s
+    """Duration of the last 5 mm to their contacts [s]: heavy links touch hard."""
+
+    grip_s: Duration = _GRIP.duration_s
+    """Duration in which the grip builds up [s]."""
+
+    tilt_s: Duration = TILT[0].duration_s
+    """Duration of the tilt [s]."""
+
+    after: Literal["leave", "hold"] = "hold"
+    """What comes after the tilt: hold holds the object, leave sets it down and withdraws."""
+
+    standoff_m: Gap = STANDOFF
+    """Distance of the hands from their contacts at the start [m]."""
+
+    phases: list[FromTable[Phase]] | None = None
+    """All phases one by one, instead of durations and after."""

@@ -11,6 +11,7 @@ from typing import Annotated, Literal
 from annotated_types import Len
 from pydantic import Field
 
+from fulcrum.scenarios.schema.derive import FromTable
 from fulcrum.scenarios.schema.keys import (
     Colour,
     Corner,
@@ -19,30 +20,16 @@ from fulcrum.scenarios.schema.keys import (
     Name,
     Place2,
     Placed,
-    Positive,
     Size3,
     Table,
-    Text,
     Vector3,
 )
-from fulcrum.scenarios.schema.motion import AnyPath, RobotTable
-from fulcrum.scenarios.schema.settings import (
-    ControlTable,
-    ManoeuvreTable,
-    PhysicsTable,
-    TolerancesTable,
-    ViewTable,
-)
-
-
-class FrictionTable(Table):
-    """Coulomb friction of a pair of surfaces."""
-
-    mu: Positive
-    """Coefficient of friction [-]."""
-
-    torsion_m: Positive | None = None
-    """Torsional over tangential friction [m], of a soft contact; a hard point without it."""
+from fulcrum.scenarios.schema.motion import AnyPath, ManoeuvreTable, RobotTable
+from fulcrum.sim.scenario.contacts import Friction
+from fulcrum.sim.scenario.control import Control
+from fulcrum.sim.scenario.physics import Physics, Tolerances
+from fulcrum.sim.scenario.scenario import View
+from fulcrum.synthesis.settings import Positive, Text
 
 
 class ObjectTable(Placed):
@@ -151,7 +138,7 @@ class SurfaceTable(Placed):
     facing: Literal["+x", "-x", "+y", "-y"] | None = None
     """Where the front of a wall looks; -x if it is left out."""
 
-    friction: FrictionTable | None = None
+    friction: FromTable[Friction] | None = None
     """Between it and the object. Without, the object passes through it."""
 
     solid: bool = True
@@ -196,7 +183,7 @@ class HandTable(Table):
     may_touch: list[Face] | None = None
     """Faces to which `fulcrum place` may move it; its own, if they are left out."""
 
-    friction: FrictionTable
+    friction: FromTable[Friction]
     """Between tip and object."""
 
     grip_limit_n: Positive | None = None
@@ -253,16 +240,16 @@ class ScenarioFile(Table):
     manoeuvre: ManoeuvreTable = ManoeuvreTable()
     """Timing of the phases."""
 
-    control: ControlTable = ControlTable()
+    control: FromTable[Control] = Field(default_factory=Control)
     """How forces are synthesised and followed."""
 
-    physics: PhysicsTable = PhysicsTable()
+    physics: FromTable[Physics] = Field(default_factory=Physics)
     """Settings of the contact solver."""
 
-    tolerances: TolerancesTable = TolerancesTable()
+    tolerances: FromTable[Tolerances] = Field(default_factory=Tolerances)
     """What counts as success."""
 
-    view: ViewTable = ViewTable()
+    view: FromTable[View] = Field(default_factory=View)
     """Where recordings look from."""
 
 
