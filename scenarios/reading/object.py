@@ -54,7 +54,8 @@ class Thing:
             FileError: The object has none.
         """
         if not isinstance(self.shape, Box):
-            raise self.source.error(key, f'"{name}"', "a point_m, as only a box has corners")
+            points = "point_m and axis" if "edge" in key else "a point_m"
+            raise self.source.error(key, f'"{name}"', f"{points}, as only a box has corners")
         return corner(self.shape.size, name)
 
 

@@ -227,6 +227,9 @@ def _sentence(model: type[BaseModel], details: Any, key: Key) -> tuple[object, s
         return "a key that does not exist", nearest(str(key[-1]), keys_at(model, details["loc"]))
     if kind == "missing":
         return "nothing", _described(model, details["loc"])
+    if kind == "string_type" and {"edge", "corner"} & set(details["loc"]):
+        points = "point_m and axis" if "edge" in details["loc"] else "point_m"
+        return _shown(given), f"{_FORMS[CORNER]}; points go into {points}, as those of meshes must"
     if kind in _KINDS:
         return _shown(given), _KINDS[kind]
     if kind in _BOUNDS:
