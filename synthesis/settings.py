@@ -20,16 +20,18 @@ import math
 import operator
 from dataclasses import dataclass
 from types import UnionType
-from typing import Annotated, Any, Union, get_args, get_origin, get_type_hints
+from typing import Annotated, Any, Literal, Union, get_args, get_origin, get_type_hints
 
 from annotated_types import Ge, Gt, Le, Len, Lt
 
 from fulcrum.synthesis.errors import InvalidInputError
 
-Positive = Annotated[float, Gt(0.0)]
-NotNegative = Annotated[float, Ge(0.0)]
-Share = Annotated[float, Ge(0.0), Le(1.0)]
-Fraction = Annotated[float, Ge(0.0), Lt(1.0)]
+# Typing keeps one of equal annotations, and pydantic has these two with integers, too: with 0.0 the
+# schema would depend on which comes first.
+Positive = Annotated[float, Gt(0)]
+NotNegative = Annotated[float, Ge(0)]
+Share = Annotated[float, Ge(0), Le(1.0)]
+Fraction = Annotated[float, Ge(0), Lt(1.0)]
 Vector3 = tuple[float, float, float]
 Spread3 = tuple[NotNegative, NotNegative, NotNegative]
 Text = Annotated[str, Len(1, 200)]
@@ -101,11 +103,16 @@ def check(field: str, annotation: Any, value: Any) -> None:
     elif origin is tuple and arguments[-1] is not Ellipsis:
         if len(value) != len(arguments):
             raise InvalidInputError(field, value, f"{len(arguments)} numbers")
+        if arguments[0] is float and not all(map(math.isfinite, value)):
+            raise InvalidInputError(field, value, "finite numbers")
         for part, item in zip(arguments, value, strict=True):
             check(field, part, item)
     elif origin is dict:
         for name, item in value.items():
             check(f"{field}.{name}", arguments[1], item)
+    elif origin is Literal:
+        if value not in arguments:
+            raise InvalidInputError(field, value, f"one of {', '.join(arguments)}")
     elif origin is Annotated and get_origin(arguments[0]) is not None:
         check(field, arguments[0], value)
     else:

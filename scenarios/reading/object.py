@@ -9,18 +9,13 @@ import numpy as np
 from fulcrum.scenarios.reading.access import Access
 from fulcrum.scenarios.reading.places import corner, only_one, orientation, vector
 from fulcrum.scenarios.reading.source import Key, Source
-from fulcrum.scenarios.schema.tables import (
-    AnyObject,
-    BoxTable,
-    CylinderTable,
-    HollowCylinderTable,
-    SurfaceTable,
-)
+from fulcrum.scenarios.schema.derive import instance
+from fulcrum.scenarios.schema.tables import SHAPES, AnyObject, SurfaceTable
 from fulcrum.sim.geometry.geom import Geom
 from fulcrum.sim.geometry.object import GRAVITY, Object
 from fulcrum.sim.geometry.pose import Pose, Vector
 from fulcrum.sim.geometry.shape import Shape, homogeneous
-from fulcrum.sim.geometry.shapes import Box, Cylinder, HollowCylinder, MeshShape
+from fulcrum.sim.geometry.shapes import Box, MeshShape
 
 # Spacing of the lines with which MuJoCo draws a plane [m].
 _GRID = 0.05
@@ -71,15 +66,12 @@ def make_thing(source: Source, table: AnyObject, access: Access) -> Thing:
 
 
 def _shape(table: AnyObject, access: Access) -> Shape:
-    if isinstance(table, BoxTable):
-        return Box(vector(table.size_m))
-    if isinstance(table, CylinderTable):
-        return Cylinder(table.radius_m, table.length_m, table.axis)
-    if isinstance(table, HollowCylinderTable):
-        radii = table.outer_radius_m, table.inner_radius_m
-        return HollowCylinder(*radii, table.length_m, table.axis)
-    mesh = access.file(("object", "file"), table.file, "a mesh file (STL, OBJ or PLY)")
-    return MeshShape(str(mesh), table.scale)
+    shape = SHAPES[table.shape]
+    if shape is not MeshShape:
+        return instance(shape, table)
+    given = table.model_dump()["file"]
+    mesh = access.file(("object", "file"), given, "a mesh file (STL, OBJ or PLY)")
+    return instance(shape, table, file=str(mesh))
 
 
 def make_object(thing: Thing, table: AnyObject) -> Object:

@@ -31,7 +31,7 @@ class _Derived:
         self, settings: type[Settings], handler: GetCoreSchemaHandler
     ) -> CoreSchema:
         table = handler.generate_schema(table_of(settings))
-        return core_schema.no_info_after_validator_function(lambda t: _made(settings, t), table)
+        return core_schema.no_info_after_validator_function(lambda t: instance(settings, t), table)
 
 
 T = TypeVar("T", bound=Settings)
@@ -42,21 +42,35 @@ _TABLES: dict[type, type[Table]] = {}
 def table_of(settings: type) -> type[Table]:
     """The table of a settings class, as a model."""
     if settings not in _TABLES:
-        keys: dict[str, Any] = {}
-        docs = _docs(settings)
-        for field in dataclasses.fields(settings):
-            key, inline = _key(settings, field.name)
-            if inline is not None:
-                inner = table_of(inline).model_fields
-                keys |= {name: (info.annotation, info) for name, info in inner.items()}
-            elif key is not None:
-                default = _default(field)
-                kind = _in_file(hints(settings)[field.name])
-                keys[key] = (kind, Field(**default, description=docs[field.name]))
         _TABLES[settings] = create_model(
-            settings.__name__, __base__=Table, __doc__=settings.__doc__, **keys
+            settings.__name__, __base__=Table, __doc__=summary(settings), **keys_of(settings)
         )
     return _TABLES[settings]
+
+
+def keys_of(settings: type) -> dict[str, Any]:
+    """Kinds and descriptions of the keys of a settings class."""
+    keys: dict[str, Any] = {}
+    docs = _docs(settings)
+    for field in dataclasses.fields(settings):
+        key, inline = _key(settings, field.name)
+        if inline is not None:
+            keys |= keys_of(inline)
+        elif key is not None:
+            kind = _in_file(hints(settings)[field.name])
+            keys[key] = (kind, Field(**_default(field), description=docs[field.name]))
+    return keys
+
+
+def same(settings: type, name: str) -> Any:
+    """Default and description of a key that stands for a field of a dataclass."""
+    field = next(field for field in dataclasses.fields(settings) if field.name == name)
+    return Field(**_default(field), description=_docs(settings)[name])
+
+
+def summary(settings: type) -> str:
+    """The first paragraph of a class's docstring."""
+    return inspect.cleandoc(settings.__doc__ or "").partition("\n\n")[0]
 
 
 def _default(field: dataclasses.Field[Any]) -> dict[str, Any]:
@@ -68,7 +82,7 @@ def _default(field: dataclasses.Field[Any]) -> dict[str, Any]:
     return {"default": list(field.default) if isinstance(field.default, tuple) else field.default}
 
 
-def _key(settings: type, field: str) -> tuple[str | None, type | None]:
+def _key(settings: type, field: str) -> tuple[str | None, type[Settings] | None]:
     """The key of a field, None if it has none; or the settings class with keys in its place."""
     annotation = hints(settings)[field]
     key = said(annotation, Key)
@@ -76,17 +90,17 @@ def _key(settings: type, field: str) -> tuple[str | None, type | None]:
     return (key.name if key else field), inline
 
 
-def _made(settings: type, table: Table) -> Any:
-    """The instance of a settings class that a table stands for."""
+def instance(settings: type[T], table: Table, **instead: Any) -> T:
+    """The instance of a settings class that a table stands for, with some fields set otherwise."""
     values: dict[str, Any] = {}
     for field in hints(settings):
         key, inline = _key(settings, field)
         if inline is not None:
-            values[field] = _made(inline, table)
+            values[field] = instance(inline, table)
         elif key is not None:
             value = getattr(table, key)
             values[field] = tuple(value) if isinstance(value, list) else value
-    return settings(**values)
+    return settings(**values | instead)
 
 
 def _in_file(annotation: Any) -> Any:

@@ -29,7 +29,7 @@ class Robustness(Settings):
 
 
 # An infinite threshold is none.
-Threshold = Annotated[float, Gt(0.0), OrInfinite]
+Threshold = Annotated[float, Gt(0), OrInfinite]
 
 
 @dataclass(frozen=True)
@@ -77,7 +77,7 @@ class Guard(Settings):
 class Control(Settings):
     """How forces are synthesised and followed by controller margin; the others are made of it."""
 
-    friction_factor: Annotated[float, Gt(0.0), Le(1.0)] = 0.8
+    friction_factor: Annotated[float, Gt(0), Le(1.0)] = 0.8
     """Share of the believed friction that the synthesis may use [-]; 1 puts the optimum on the
     cone, where it slips."""
 

@@ -13,7 +13,7 @@ from fulcrum.synthesis import InvalidInputError
 from fulcrum.synthesis.settings import Key, NotNegative, Settings, Share, Text
 
 # A trace takes about 2 kB per step: a gigabyte in ten minutes.
-Duration = Annotated[float, Gt(0.0), Le(600.0)]
+Duration = Annotated[float, Gt(0), Le(600.0)]
 # No arm reaches farther, and the joint path takes a step every 5 mm.
 Gap = Annotated[NotNegative, Le(10.0)]
 

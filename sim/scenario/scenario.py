@@ -30,15 +30,12 @@ class View(Settings):
 
 @dataclass(frozen=True)
 class Scenario:
-    """Everything that a run needs to know; nothing else may distinguish one scene from another.
-
-    ``holdable`` says whether forces that hold the object are expected to exist all along the path;
-    a scenario that shows the contrary says False. ``rests`` is where the object may lie besides
-    its supports, ``standoff`` the distance of the hands from their contacts at the start [m].
-    """
+    """Everything that a run needs to know; nothing else may distinguish one scene from another."""
 
     name: str
     summary: str
+    """One line for `fulcrum list`."""
+
     object: Object
     environment: tuple[Geom, ...]
     hands: tuple[Hand, ...]
@@ -46,9 +43,15 @@ class Scenario:
     robots: tuple[Robot, ...]
     path: Pivot | Poses
     rests: tuple[Rest, ...] = ()
+    """Where the object may lie besides its supports."""
+
     phases: tuple[Phase, ...] = (*REACH, *TILT, *HOLD)
     standoff: float = STANDOFF
+    """Distance of the hands from their contacts at the start [m]."""
+
     holdable: bool = True
+    """Whether forces that hold the object are expected all along the path."""
+
     control: Control = Control()
     physics: Physics = Physics()
     tolerances: Tolerances = Tolerances()
