@@ -10,8 +10,9 @@ import ast
 import dataclasses
 import enum
 import inspect
-import textwrap
-from functools import reduce
+import itertools
+import sys
+from functools import cache, reduce
 from operator import or_
 from types import UnionType
 from typing import Annotated, Any, TypeVar, Union, get_args, get_origin
@@ -35,6 +36,7 @@ class _Derived:
 
 
 T = TypeVar("T", bound=Settings)
+AnyTable = TypeVar("AnyTable", bound=Table)
 FromTable = Annotated[T, _Derived()]
 _TABLES: dict[type, type[Table]] = {}
 
@@ -42,10 +44,20 @@ _TABLES: dict[type, type[Table]] = {}
 def table_of(settings: type) -> type[Table]:
     """The table of a settings class, as a model."""
     if settings not in _TABLES:
-        _TABLES[settings] = create_model(
-            settings.__name__, __base__=Table, __doc__=summary(settings), **keys_of(settings)
-        )
+        _TABLES[settings] = derived(settings.__name__, Table, settings)
     return _TABLES[settings]
+
+
+def derived(name: str, base: type[AnyTable], settings: type, **keys: Any) -> type[AnyTable]:
+    """A table with the keys of another one, some of its own, and those of a settings class."""
+    keys |= keys_of(settings)
+    return create_model(
+        name,
+        __base__=base,
+        __doc__=inspect.cleandoc(settings.__doc__ or "").partition("\n\n")[0],
+        __cls_kwargs__={"use_attribute_docstrings": False},  # they are there; a search takes 0.1 s
+        **keys,
+    )
 
 
 def keys_of(settings: type) -> dict[str, Any]:
@@ -66,11 +78,6 @@ def same(settings: type, name: str) -> Any:
     """Default and description of a key that stands for a field of a dataclass."""
     field = next(field for field in dataclasses.fields(settings) if field.name == name)
     return Field(**_default(field), description=_docs(settings)[name])
-
-
-def summary(settings: type) -> str:
-    """The first paragraph of a class's docstring."""
-    return inspect.cleandoc(settings.__doc__ or "").partition("\n\n")[0]
 
 
 def _default(field: dataclasses.Field[Any]) -> dict[str, Any]:
@@ -123,11 +130,17 @@ def _in_file(annotation: Any) -> Any:
 def _docs(settings: type) -> dict[str, str]:
     """The texts below the fields of a class and of those that it is made of."""
     found: dict[str, str] = {}
-    for base in reversed(settings.__mro__[:-1]):
-        (tree,) = ast.parse(textwrap.dedent(inspect.getsource(base))).body
-        assert isinstance(tree, ast.ClassDef)
-        for field, doc in zip(tree.body, tree.body[1:], strict=False):
+    for base in filter(dataclasses.is_dataclass, reversed(settings.__mro__)):
+        body = _classes(base.__module__)[base.__name__].body
+        for field, doc in itertools.pairwise(body):
             if isinstance(field, ast.AnnAssign) and isinstance(doc, ast.Expr):
                 assert isinstance(field.target, ast.Name) and isinstance(doc.value, ast.Constant)
                 found[field.target.id] = inspect.cleandoc(str(doc.value.value))
     return found
+
+
+@cache
+def _classes(module: str) -> dict[str, ast.ClassDef]:
+    """The classes of a module, as its source has them."""
+    tree = ast.parse(inspect.getsource(sys.modules[module]))
+    return {node.name: node for node in tree.body if isinstance(node, ast.ClassDef)}

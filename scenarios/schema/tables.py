@@ -11,9 +11,9 @@ from operator import or_
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from annotated_types import Len
-from pydantic import Field, create_model
+from pydantic import Field
 
-from fulcrum.scenarios.schema.derive import FromTable, keys_of, same, summary
+from fulcrum.scenarios.schema.derive import FromTable, derived, same
 from fulcrum.scenarios.schema.keys import (
     Colour,
     Corner,
@@ -77,9 +77,7 @@ SHAPES: dict[str, type[Shape]] = {
 def _object_table(name: str, shape: type[Shape]) -> type[ObjectTable]:
     """The table of an object with a shape: keys of any object, and those of the shape."""
     tag: Any = (Literal[name], Field(description=ObjectTable.model_fields["shape"].description))
-    keys = {"shape": tag, **keys_of(shape)}
-    kind = f"{shape.__name__}Table"
-    return create_model(kind, __base__=ObjectTable, __doc__=summary(shape), **keys)
+    return derived(f"{shape.__name__}Table", ObjectTable, shape, shape=tag)
 
 
 if TYPE_CHECKING:
