@@ -41,7 +41,7 @@ class NewCommand:
 
     def execute(self) -> int:
         """Does it; returns the exit code."""
-        from fulcrum.scenarios.reading.file import SCHEMA, SUFFIX, made, open_source
+        from fulcrum.scenarios.reading.file import SCHEMA, SUFFIX, bring_schema, made, open_source
         from fulcrum.scenarios.reading.source import Source
         from fulcrum.scenarios.schema.writer import write
         from fulcrum.synthesis.errors import InvalidInputError
@@ -56,8 +56,9 @@ class NewCommand:
             raise InvalidInputError("name", self.name, f"another one, as {file} exists")
         data = open_source(self._origin()).data
         self._change(data)
-        text = write(data, SCHEMA.as_uri())
+        text = write(data, SCHEMA.name)
         made(Source(file, text), self.allow_path)  # what it names may not be there
+        bring_schema(file.parent)
         file.write_text(text, encoding="utf-8")
         print(f"{file}: see what `fulcrum check {file}` says of it.")
         return PASSED

@@ -80,7 +80,7 @@ class PlaceCommand(Chosen):
         """Does it; returns the exit code: 1 if nothing better was found."""
         from rich.console import Console
 
-        from fulcrum.scenarios.reading.file import made
+        from fulcrum.scenarios.reading.file import bring_schema, made
         from fulcrum.scenarios.reading.placed import placed
         from fulcrum.scenarios.reading.source import Source
         from fulcrum.sim.placement.picture import draw
@@ -101,8 +101,10 @@ class PlaceCommand(Chosen):
             return FAILED
         elsewhere = out.absolute().parent != source.file.absolute().parent
         note = f"Placed by `fulcrum place {shlex.join(self._words())}`."
-        text = placed(source.file.read_text("utf-8"), scenario, found.scenario, note, elsewhere)
+        text = placed(source.file.read_text("utf-8-sig"), scenario, found.scenario, note, elsewhere)
         made(Source(out, text), self.allow_path)  # a file that it names may be out of its reach now
+        if elsewhere:
+            bring_schema(out.parent)
         out.write_text(text, encoding="utf-8")
         picture = out.with_suffix(".png")
         draw(scenario, found, control, picture)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from fulcrum.assets.packages import package_root
-from fulcrum.scenarios.reading.source import Key, Source, nearest
+from fulcrum.scenarios.reading.source import KeyPath, Source, nearest
 
 
 class Access:
@@ -15,7 +15,7 @@ class Access:
         self._source, self._folder = source, source.file.absolute().parent
         self._allowed = tuple(folder.resolve() for folder in (self._folder, *allowed))
 
-    def file(self, key: Key, given: str, what: str) -> Path:
+    def file(self, key: KeyPath, given: str, what: str) -> Path:
         """The file that a key names, relative to the scenario file.
 
         Raises:
@@ -36,7 +36,7 @@ class Access:
             raise self._source.error(key, given, f"{what} that exists")
         return found
 
-    def model(self, key: Key, given: str, shipped: tuple[str, ...], what: str) -> str:
+    def model(self, key: KeyPath, given: str, shipped: tuple[str, ...], what: str) -> str:
         """A model that ships, by its name, or the path of the file that a key names.
 
         Raises:

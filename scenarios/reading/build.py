@@ -3,23 +3,30 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 
 from fulcrum.assets import ROBOTS
 from fulcrum.scenarios.reading.access import Access
 from fulcrum.scenarios.reading.contacts import make_hand, make_support
-from fulcrum.scenarios.reading.object import Thing, friction, make_object, make_surface, make_thing
+from fulcrum.scenarios.reading.object import Thing, make_object, make_surface, make_thing
 from fulcrum.scenarios.reading.places import direction, only_one, orientation, vector
-from fulcrum.scenarios.reading.settings import control, phases, physics, tolerances
-from fulcrum.scenarios.reading.source import Key, Source
-from fulcrum.scenarios.schema.motion import PosesTable, RobotTable, ScrewTable, TiltTable
+from fulcrum.scenarios.reading.source import KeyPath, Source
+from fulcrum.scenarios.schema.motion import (
+    ManoeuvreTable,
+    PosesTable,
+    RobotTable,
+    ScrewTable,
+    TiltTable,
+)
 from fulcrum.scenarios.schema.tables import ScenarioFile
 from fulcrum.sim.geometry.pose import Pose
 from fulcrum.sim.scenario.contacts import Rest, Support
 from fulcrum.sim.scenario.path import Pivot, Poses
+from fulcrum.sim.scenario.phases import HOLD, LEAVE, REACH, TILT, Phase, stretched
 from fulcrum.sim.scenario.robot import Robot
-from fulcrum.sim.scenario.scenario import Scenario, View
+from fulcrum.sim.scenario.scenario import Scenario
 
 
 def build(source: Source, file: ScenarioFile, access: Access) -> Scenario:
@@ -45,13 +52,13 @@ def build(source: Source, file: ScenarioFile, access: Access) -> Scenario:
             robots=tuple(_robot(source, i, r, access) for i, r in enumerate(file.robots)),
             path=_path(thing, file.path),
             rests=_rests(thing, file, supports),
-            phases=phases(source, file.manoeuvre),
+            phases=_phases(source, file.manoeuvre),
             standoff=file.manoeuvre.standoff_m,
             holdable=file.holdable,
-            control=control(file.control),
-            physics=physics(file.physics),
-            tolerances=tolerances(file.tolerances),
-            view=View(vector(file.view.eye_m), vector(file.view.target_m)),
+            control=file.control,
+            physics=file.physics,
+            tolerances=file.tolerances,
+            view=file.view,
         )
 
 
@@ -75,14 +82,14 @@ def _rests(thing: Thing, file: ScenarioFile, supports: tuple[Support, ...]) -> t
     """Surfaces with friction on which no support stands."""
     taken = {support.surface for support in supports}
     return tuple(
-        Rest(thing.resting, name, friction(surface.friction))
+        Rest(thing.resting, name, surface.friction)
         for name, surface in file.environment.items()
         if surface.friction is not None and name not in taken
     )
 
 
 def _robot(source: Source, index: int, table: RobotTable, access: Access) -> Robot:
-    key: Key = ("robots", index)
+    key: KeyPath = ("robots", index)
     posture: dict[str, float] = {}
     for name, values, unit in (
         ("posture_deg", table.posture_deg, math.radians(1.0)),
@@ -110,7 +117,7 @@ def _robot(source: Source, index: int, table: RobotTable, access: Access) -> Rob
 def _path(thing: Thing, table: TiltTable | ScrewTable | PosesTable) -> Pivot | Poses:
     if isinstance(table, PosesTable):
         return _poses(thing, table)
-    key: Key = ("path",)
+    key: KeyPath = ("path",)
     source = thing.source
     only_one(source, key, {"edge": table.edge, "point_m": table.point_m})
     if table.edge is not None:
@@ -146,10 +153,26 @@ def _path(thing: Thing, table: TiltTable | ScrewTable | PosesTable) -> Pivot | P
 
 
 def _poses(thing: Thing, table: PosesTable) -> Poses:
-    key: Key = ("path", "poses")
+    key: KeyPath = ("path", "poses")
     passed = [
         Pose(vector(pose.position_m), orientation(thing.source, (*key, i), pose))
         for i, pose in enumerate(table.poses)
     ]
     with thing.source.at(("path",)):
         return Poses((thing.start, *passed))
+
+
+def _phases(source: Source, table: ManoeuvreTable) -> tuple[Phase, ...]:
+    if table.phases is None:
+        after: tuple[Phase, ...] = HOLD
+        if table.after == "leave":
+            standoff = table.standoff_m
+            after = tuple(replace(p, gap=standoff) if p.gap > 0.0 else p for p in LEAVE)
+        lasts = (table.approach_s, table.touch_s, table.grip_s)
+        reach = (replace(p, duration_s=d) for p, d in zip(REACH, lasts, strict=True))
+        return stretched((*reach, *TILT, *after), table.tilt_s)
+    for name in ("approach_s", "touch_s", "grip_s", "tilt_s", "after"):
+        if name in table.model_fields_set:
+            given = getattr(table, name)
+            raise source.error(("manoeuvre", name), given, "left out where phases are given")
+    return tuple(table.phases)

@@ -9,7 +9,7 @@ import numpy as np
 
 from fulcrum.assets import HANDS
 from fulcrum.scenarios.reading.access import Access
-from fulcrum.scenarios.reading.object import Thing, friction, front
+from fulcrum.scenarios.reading.object import Thing, front
 from fulcrum.scenarios.reading.places import (
     ON_SURFACE,
     direction,
@@ -19,7 +19,7 @@ from fulcrum.scenarios.reading.places import (
     usual_tangent,
     vector,
 )
-from fulcrum.scenarios.reading.source import Key, Source, nearest
+from fulcrum.scenarios.reading.source import KeyPath, Source, nearest
 from fulcrum.scenarios.schema.tables import HandTable, SupportTable, SurfaceTable
 from fulcrum.sim.geometry.geom import Geom
 from fulcrum.sim.geometry.pose import Pose
@@ -38,7 +38,7 @@ def make_hand(thing: Thing, name: str, table: HandTable, access: Access) -> Hand
     Raises:
         FileError: The contact is not on the surface, or inside out.
     """
-    key: Key = ("hands", name)
+    key: KeyPath = ("hands", name)
     point, normal = _touched(thing, key, table)
     normal = _normal(thing.source, key, table.normal, normal)
     with thing.source.at(key):
@@ -50,13 +50,13 @@ def make_hand(thing: Thing, name: str, table: HandTable, access: Access) -> Hand
             p_OC_O=point,
             normal_O=normal,
             tangent_O=_tangent(thing.source, key, table.tangent, normal),
-            friction=friction(table.friction),
+            friction=table.friction,
             f_n_max=math.inf if table.grip_limit_n is None else table.grip_limit_n,
             mount_pose=Pose(vector(table.mount_position_m or [0.0] * 3), turn(table.mount_rpy_deg)),
         )
 
 
-def _touched(thing: Thing, key: Key, table: HandTable) -> tuple[Vector, Vector]:
+def _touched(thing: Thing, key: KeyPath, table: HandTable) -> tuple[Vector, Vector]:
     """Where a hand touches the object, and the inward normal there."""
     source, shape = thing.source, thing.shape
     only_one(source, key, {"face": table.face, "point_m": table.point_m})
@@ -90,13 +90,13 @@ def make_support(
     Raises:
         FileError: The point is not on both, or there is no such surface.
     """
-    key: Key = ("supports", name)
+    key: KeyPath = ("supports", name)
     source, surface = thing.source, surfaces.get(table.surface)
     if surface is None:
         known = nearest(table.surface, list(surfaces))
         raise source.error((*key, "surface"), f'"{table.surface}"', known)
     if surface.friction is None:
-        where: Key = ("environment", table.surface, "friction")
+        where: KeyPath = ("environment", table.surface, "friction")
         raise source.error(where, "nothing", f"friction, such as {{ mu = 0.3 }}, for {name}")
     point = _support_point(thing, key, table)
     p_W = thing.start.in_parent(point)
@@ -112,11 +112,11 @@ def make_support(
         p_OP_O=point,
         normal_W=normal,
         tangent_W=_tangent(source, key, table.tangent, normal),
-        friction=friction(surface.friction),
+        friction=surface.friction,
     )
 
 
-def _support_point(thing: Thing, key: Key, table: SupportTable) -> Vector:
+def _support_point(thing: Thing, key: KeyPath, table: SupportTable) -> Vector:
     only_one(thing.source, key, {"corner": table.corner, "point_m": table.point_m})
     if table.corner is not None:
         return thing.corner((*key, "corner"), table.corner)
@@ -129,7 +129,7 @@ def _support_point(thing: Thing, key: Key, table: SupportTable) -> Vector:
 
 def _check_near(
     source: Source,
-    key: Key,
+    key: KeyPath,
     p: Vector,
     closest: Sequence[float] | Array,
     what: str,
@@ -142,7 +142,7 @@ def _check_near(
         raise source.error(key, given, valid)
 
 
-def _normal(source: Source, key: Key, given: list[float] | None, own: Vector) -> Vector:
+def _normal(source: Source, key: KeyPath, given: list[float] | None, own: Vector) -> Vector:
     """The normal that is given, if it points to the same side as the surface's own."""
     if given is None:
         return own
@@ -153,7 +153,7 @@ def _normal(source: Source, key: Key, given: list[float] | None, own: Vector) ->
     return normal
 
 
-def _tangent(source: Source, key: Key, given: list[float] | None, normal: Vector) -> Vector:
+def _tangent(source: Source, key: KeyPath, given: list[float] | None, normal: Vector) -> Vector:
     if given is None:
         return usual_tangent(normal)
     tangent = _direction(source, (*key, "tangent"), given)
@@ -166,7 +166,7 @@ def _tangent(source: Source, key: Key, given: list[float] | None, normal: Vector
     return direction(across(np.asarray(tangent), np.asarray(normal)))
 
 
-def _direction(source: Source, key: Key, values: list[float]) -> Vector:
+def _direction(source: Source, key: KeyPath, values: list[float]) -> Vector:
     """A direction, of length 1."""
     length = math.hypot(*values)
     if not 1e-6 < length < 1e6:

@@ -29,6 +29,7 @@ TEMPLATE = Path(__file__).resolve().parents[1] / "template.toml"
 SCHEMA = SCENES / "scenario.schema.json"
 # Longer ones are no scenario [bytes].
 _LONGEST = 2_000_000
+_TITLE = "fulcrum scenario"
 
 
 def read(file: Path, allowed: tuple[Path, ...] = ()) -> Scenario:
@@ -65,7 +66,7 @@ def open_source(file: Path) -> Source:
     try:
         if file.stat().st_size > _LONGEST:
             raise FileError(file, None, "", f"{file.stat().st_size} bytes", valid)
-        return Source(file, file.read_text(encoding="utf-8"))
+        return Source(file, file.read_text(encoding="utf-8-sig"))
     except OSError as error:
         raise FileError(file, None, "", error.strerror or str(error), valid) from None
     except ValueError as error:  # no UTF-8, or a name with a zero in it
@@ -136,11 +137,23 @@ def valid_names(word: str) -> str:
     return f"{nearest(word, list(scene_files()))}, or a file ending in {SUFFIX}"
 
 
+def bring_schema(folder: Path) -> None:
+    """Put the schema into a folder, where editors find it by its name alone.
+
+    A file of that name that is no such schema stays as it is.
+    """
+    copy, text = folder / SCHEMA.name, SCHEMA.read_text(encoding="utf-8")
+    if copy.resolve() == SCHEMA:
+        return
+    if not copy.exists() or _TITLE in copy.read_text(encoding="utf-8", errors="replace"):
+        copy.write_text(text, encoding="utf-8")
+
+
 def schema() -> dict[str, Any]:
     """The JSON Schema of scenario files."""
     made = TypeAdapter(ScenarioFile | LiftedFile).json_schema()
     return {
         "$schema": "https://json-schema.org/draft/2020-12/schema",
-        "title": "fulcrum scenario",
+        "title": _TITLE,
         **made,
     }

@@ -8,21 +8,14 @@ import numpy as np
 
 from fulcrum.scenarios.reading.access import Access
 from fulcrum.scenarios.reading.places import corner, only_one, orientation, vector
-from fulcrum.scenarios.reading.source import Key, Source
-from fulcrum.scenarios.schema.tables import (
-    AnyObject,
-    BoxTable,
-    CylinderTable,
-    FrictionTable,
-    HollowCylinderTable,
-    SurfaceTable,
-)
+from fulcrum.scenarios.reading.source import KeyPath, Source
+from fulcrum.scenarios.schema.derive import instance
+from fulcrum.scenarios.schema.tables import SHAPES, AnyObject, SurfaceTable
 from fulcrum.sim.geometry.geom import Geom
 from fulcrum.sim.geometry.object import GRAVITY, Object, homogeneous
 from fulcrum.sim.geometry.pose import Pose
 from fulcrum.sim.geometry.shape import Shape
-from fulcrum.sim.geometry.shapes import Box, Cylinder, HollowCylinder, MeshShape
-from fulcrum.sim.scenario.contacts import Friction
+from fulcrum.sim.geometry.shapes import Box, MeshShape
 from fulcrum.synthesis.arrays import Vector
 
 # Spacing of the lines with which MuJoCo draws a plane [m].
@@ -50,14 +43,15 @@ class Thing:
         """Name of the geom that touches the environment."""
         return self.shape.resting or self.name
 
-    def corner(self, key: Key, name: str) -> Vector:
+    def corner(self, key: KeyPath, name: str) -> Vector:
         """A corner in the object frame [m].
 
         Raises:
             FileError: The object has none.
         """
         if not isinstance(self.shape, Box):
-            raise self.source.error(key, f'"{name}"', "a point_m, as only a box has corners")
+            points = "point_m and axis" if "edge" in key else "a point_m"
+            raise self.source.error(key, f'"{name}"', f"{points}, as only a box has corners")
         return corner(self.shape.size, name)
 
 
@@ -73,15 +67,12 @@ def make_thing(source: Source, table: AnyObject, access: Access) -> Thing:
 
 
 def _shape(table: AnyObject, access: Access) -> Shape:
-    if isinstance(table, BoxTable):
-        return Box(vector(table.size_m))
-    if isinstance(table, CylinderTable):
-        return Cylinder(table.radius_m, table.length_m, table.axis)
-    if isinstance(table, HollowCylinderTable):
-        radii = table.outer_radius_m, table.inner_radius_m
-        return HollowCylinder(*radii, table.length_m, table.axis)
-    mesh = access.file(("object", "file"), table.file, "a mesh file (STL, OBJ or PLY)")
-    return MeshShape(str(mesh), table.scale)
+    shape = SHAPES[table.shape]
+    if shape is not MeshShape:
+        return instance(shape, table)
+    given = table.model_dump()["file"]
+    mesh = access.file(("object", "file"), given, "a mesh file (STL, OBJ or PLY)")
+    return instance(shape, table, file=str(mesh))
 
 
 def make_object(thing: Thing, table: AnyObject) -> Object:
@@ -90,7 +81,7 @@ def make_object(thing: Thing, table: AnyObject) -> Object:
     Raises:
         FileError: Its mass is not given, or in several ways.
     """
-    key: Key = ("object",)
+    key: KeyPath = ("object",)
     names = ("weight_n", "mass_kg", "density_kg_per_m3")
     only_one(thing.source, key, {name: getattr(table, name) for name in names})
     if table.weight_n is not None:
@@ -116,7 +107,7 @@ def make_surface(source: Source, name: str, surface: SurfaceTable) -> Geom:
     Raises:
         FileError: Its kind has another number of lengths, or no front.
     """
-    key: Key = ("environment", name)
+    key: KeyPath = ("environment", name)
     quaternion = orientation(source, key, surface)
     at, size = np.asarray(surface.position_m), surface.size_m
     count = 2 if surface.kind in ("floor", "post") else 3
@@ -144,11 +135,6 @@ def front(surface: SurfaceTable) -> Vector:
     facing = surface.facing or "-x"
     x, y, z = (float(facing == f"+{axis}") - float(facing == f"-{axis}") for axis in "xyz")
     return (x, y, z)
-
-
-def friction(table: FrictionTable) -> Friction:
-    """Friction of a pair of surfaces."""
-    return Friction(table.mu, table.torsion_m)
 
 
 def colour(values: list[float]) -> tuple[float, float, float, float]:

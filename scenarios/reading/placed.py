@@ -29,7 +29,7 @@ def placed(text: str, before: Scenario, after: Scenario, note: str, elsewhere: b
         before: What it says.
         after: The same scenario, placed otherwise.
         note: A comment for its head.
-        elsewhere: Whether it goes to another folder, from where the schema has to be found.
+        elsewhere: Whether it goes to another folder, where the schema will be beside it.
     """
     document = tomlkit.parse(text)
     for table, old, new in zip(document["robots"], before.robots, after.robots, strict=True):
@@ -43,7 +43,7 @@ def placed(text: str, before: Scenario, after: Scenario, note: str, elsewhere: b
     if not head.startswith(_SCHEMA):
         return f"# {note}\n{head}\n{rest}"
     if elsewhere:
-        head = f"{_SCHEMA}{SCHEMA.as_uri()}"
+        head = f"{_SCHEMA}{SCHEMA.name}"
     return f"{head}\n# {note}\n{rest}"
 
 

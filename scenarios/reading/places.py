@@ -8,7 +8,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from fulcrum.scenarios.reading.source import Key, Source
+from fulcrum.scenarios.reading.source import KeyPath, Source
 from fulcrum.scenarios.schema.keys import Placed
 from fulcrum.sim.geometry.geom import Geom
 from fulcrum.sim.geometry.pose import Quaternion, wxyz
@@ -44,7 +44,7 @@ def turn(rpy_deg: list[float] | None) -> Quaternion:
     return (w, x + 0.0, y + 0.0, z + 0.0)
 
 
-def orientation(source: Source, key: Key, given: Placed) -> Quaternion:
+def orientation(source: Source, key: KeyPath, given: Placed) -> Quaternion:
     """The orientation that a table gives in one of two ways.
 
     Raises:
@@ -58,7 +58,7 @@ def orientation(source: Source, key: Key, given: Placed) -> Quaternion:
     return (w, x, y, z)
 
 
-def only_one(source: Source, key: Key, options: Mapping[str, object]) -> None:
+def only_one(source: Source, key: KeyPath, options: Mapping[str, object]) -> None:
     """Checks that exactly one of several keys is given.
 
     Raises:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from fulcrum.scenarios.reading.file import open_source
-from fulcrum.scenarios.reading.source import FileError, Key, Source, nearest
+from fulcrum.scenarios.reading.source import FileError, KeyPath, Source, nearest
 from fulcrum.sim.model.scene import compose
 from fulcrum.sim.scenario.scenario import Scenario
 from fulcrum.synthesis import InvalidInputError
@@ -32,7 +32,7 @@ def check_scene(file: Path, scenario: Scenario) -> None:
         raise source.error(key, given, valid) from None
 
 
-def _scene_key(source: Source, scenario: Scenario, field: str, given: str) -> Key:
+def _scene_key(source: Source, scenario: Scenario, field: str, given: str) -> KeyPath:
     """The key that a field of the scenario comes from, as far as it can be told."""
     if "lifted_from" in source.data:
         return ("lifted_from",)
@@ -67,7 +67,7 @@ _ROBOT_KEYS = {
 }
 
 
-def _robot_key(source: Source, index: int, rest: list[str]) -> Key:
+def _robot_key(source: Source, index: int, rest: list[str]) -> KeyPath:
     """The key of what a robot is refused for: a field and perhaps a joint."""
     table, key = source.data["robots"][index], ("robots", index)
     field, joint = rest

@@ -16,7 +16,7 @@ from fulcrum.scenarios.schema.keys import CORNER, NAME, PREFIX
 from fulcrum.scenarios.schema.walk import table_at
 from fulcrum.synthesis import InvalidInputError
 
-Key = tuple[str | int, ...]
+KeyPath = tuple[str | int, ...]
 
 # How alike two words are if one is a slip of the other [-].
 _ALIKE = 0.6
@@ -88,27 +88,31 @@ class Source:
         except RecursionError:
             raise FileError(file, None, "", "brackets too deep", "TOML") from None
 
-    def error(self, key: Key, given: object, valid: str) -> FileError:
+    def error(self, key: KeyPath, given: object, valid: str) -> FileError:
         """The error of a key, on the line of the nearest table that is there."""
         return FileError(self.file, self.line(key), dotted(key), given, valid)
 
     @contextlib.contextmanager
-    def at(self, key: Key) -> Iterator[None]:
+    def at(self, key: KeyPath) -> Iterator[None]:
         """Turns refusals of the dataclasses that are made inside into errors of the file."""
         try:
             yield
         except FileError:
             raise
         except InvalidInputError as error:
-            name = error.field.rpartition(".")[2]
-            table: Any = self.data
-            for part in key:
-                table = table[part] if _has(table, part) else {}
-            if isinstance(table, dict):
-                key = (*key, *[given for given in table if given.startswith(name)][:1])
-            raise self.error(key, error.given, error.valid) from None
+            raise self.refused(key, error) from None
 
-    def line(self, key: Key) -> int | None:
+    def refused(self, key: KeyPath, error: InvalidInputError) -> FileError:
+        """The refusal of a dataclass that is made from the table at a key, as one of the file."""
+        name = error.field.rpartition(".")[2]
+        table: Any = self.data
+        for part in key:
+            table = table[part] if _has(table, part) else {}
+        if isinstance(table, dict):
+            key = (*key, *[given for given in table if given.startswith(name)][:1])
+        return self.error(key, error.given, error.valid)
+
+    def line(self, key: KeyPath) -> int | None:
         """Where the statement begins that brings a key, or the table that it is missing from."""
         known = key
         while known and not _holds(self.data, known):
@@ -146,7 +150,7 @@ def _says_nothing(line: str) -> bool:
     return not line.strip() or line.lstrip().startswith("#")
 
 
-def _holds(data: Any, key: Key) -> bool:
+def _holds(data: Any, key: KeyPath) -> bool:
     for part in key:
         if not _has(data, part):
             return False
@@ -160,7 +164,7 @@ def _has(data: Any, part: str | int) -> bool:
     return isinstance(data, dict) and part in data
 
 
-def dotted(key: Key) -> str:
+def dotted(key: KeyPath) -> str:
     """A key as people write it: ``robots[0].posture_deg.left_s0``."""
     text = ""
     for part in key:
@@ -193,13 +197,15 @@ def explained(source: Source, model: type[BaseModel], error: ValidationError) ->
         found.append((details["type"] != "extra_forbidden", source.line(key) or 0, key, details))
     found.sort(key=lambda item: item[:2])
     _, _, key, details = found[0]
+    if details["type"] == "value_error":
+        return source.refused(key, details["ctx"]["error"])
     given, valid = _sentence(model, details, key)
     if len(found) > 1:
         valid += f" (and {len(found) - 1} more to mend)"
     return source.error(key, given, valid)
 
 
-def _key(data: Any, loc: tuple[str | int, ...]) -> Key:
+def _key(data: Any, loc: tuple[str | int, ...]) -> KeyPath:
     """The key of pydantic's location, which also names the members of unions."""
     key: list[str | int] = []
     for i, part in enumerate(loc):
@@ -214,13 +220,16 @@ def _key(data: Any, loc: tuple[str | int, ...]) -> Key:
     return tuple(key)
 
 
-def _sentence(model: type[BaseModel], details: Any, key: Key) -> tuple[object, str]:
+def _sentence(model: type[BaseModel], details: Any, key: KeyPath) -> tuple[object, str]:
     """What was given, and what is valid."""
     kind, given, context = details["type"], details["input"], details.get("ctx", {})
     if kind == "extra_forbidden":
         return "a key that does not exist", nearest(str(key[-1]), keys_at(model, details["loc"]))
     if kind == "missing":
         return "nothing", _described(model, details["loc"])
+    if kind == "string_type" and {"edge", "corner"} & set(details["loc"]):
+        points = "point_m and axis" if "edge" in details["loc"] else "point_m"
+        return _shown(given), f"{_FORMS[CORNER]}; points go into {points}, as those of meshes must"
     if kind in _KINDS:
         return _shown(given), _KINDS[kind]
     if kind in _BOUNDS:

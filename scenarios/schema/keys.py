@@ -4,32 +4,28 @@ from __future__ import annotations
 
 from typing import Annotated
 
-from annotated_types import Ge, Gt, Len
+from annotated_types import Len
 from pydantic import BaseModel, ConfigDict, Field
+
+from fulcrum.synthesis.settings import Positive, Share
 
 # Forms of text.
 NAME = r"^[A-Za-z][A-Za-z0-9_-]*$"
 CORNER = r"^[+-]x ?[+-]y ?[+-]z$"
 PREFIX = r"^([A-Za-z][A-Za-z0-9_]*)?$"
 
-Number = Annotated[float, Field(strict=True)]
-Positive = Annotated[Number, Gt(0.0)]
-NotNegative = Annotated[Number, Ge(0.0)]
-Vector3 = Annotated[list[Number], Len(3, 3), Field(examples=[[0.0, 0.0, 0.0]])]
+Vector3 = Annotated[list[float], Len(3, 3), Field(examples=[[0.0, 0.0, 0.0]])]
 # Directions need not be of length 1.
-Direction = Annotated[list[Number], Len(3, 3), Field(examples=[[0.0, 0.0, 1.0]])]
-Quaternion4 = Annotated[list[Number], Len(4, 4), Field(examples=[[1.0, 0.0, 0.0, 0.0]])]
+Direction = Annotated[list[float], Len(3, 3), Field(examples=[[0.0, 0.0, 1.0]])]
+Quaternion4 = Annotated[list[float], Len(4, 4), Field(examples=[[1.0, 0.0, 0.0, 0.0]])]
 # Where on a face, along each of its two coordinates.
-Place2 = Annotated[
-    list[Annotated[Number, Field(ge=0.0, le=1.0)]], Len(2, 2), Field(examples=[[0.5, 0.5]])
-]
+Place2 = Annotated[list[Share], Len(2, 2), Field(examples=[[0.5, 0.5]])]
 Size3 = Annotated[list[Positive], Len(3, 3), Field(examples=[[0.01, 0.01, 0.01]])]
 # What bodies, geoms and contacts are called in the simulation, in reports and in recordings.
 Name = Annotated[str, Field(pattern=NAME)]
 Corner = Annotated[str, Field(pattern=CORNER, examples=["-x +y -z"])]
-Colour = Annotated[list[Annotated[Number, Ge(0.0), Field(le=1.0)]], Len(4, 4)]
+Colour = Annotated[list[Share], Len(4, 4)]
 Face = Annotated[str, Field(max_length=20, examples=["+y"])]
-Text = Annotated[str, Field(min_length=1, max_length=200)]
 
 
 class Table(BaseModel):

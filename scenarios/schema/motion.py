@@ -1,24 +1,21 @@
-"""The scenario file as models: the robots, and the path along which they move the object."""
+"""The scenario file as models: the robots, the path of the object, and the phases along it."""
 
 from __future__ import annotations
 
 from typing import Annotated, Any, Literal
 
-from annotated_types import Gt, Len, Lt
+from annotated_types import Len
 from pydantic import Discriminator, Field, Tag
 
-from fulcrum.scenarios.schema.keys import (
-    PREFIX,
-    Corner,
-    Direction,
-    NotNegative,
-    Number,
-    Placed,
-    Positive,
-    Table,
-    Text,
-    Vector3,
-)
+from fulcrum.scenarios.schema.derive import FromTable, same
+from fulcrum.scenarios.schema.keys import PREFIX, Corner, Direction, Placed, Table, Vector3
+from fulcrum.sim.scenario.path import Angle, Pivot
+from fulcrum.sim.scenario.phases import REACH, TILT, Duration, Gap, Phase
+from fulcrum.sim.scenario.robot import Robot
+from fulcrum.sim.scenario.scenario import Scenario
+from fulcrum.synthesis.settings import NotNegative, Positive, Text
+
+_APPROACH, _TOUCH, _GRIP = REACH
 
 
 class RobotTable(Placed):
@@ -27,20 +24,18 @@ class RobotTable(Placed):
     model: Text
     """A name that ships, or a URDF or MJCF file relative to this one."""
 
-    prefix: Annotated[str, Field(pattern=PREFIX)] = ""
-    """What stands before the names of its bodies and joints; robots of a scene differ in it."""
+    prefix: Annotated[str, Field(pattern=PREFIX)] = same(Robot, "prefix")
 
-    posture_deg: dict[str, Number] = {}
+    posture_deg: dict[str, float] = {}
     """Start angles by joint [deg], without the prefix; inverse kinematics seeks from there."""
 
-    posture_rad: dict[str, Number] = {}
+    posture_rad: dict[str, float] = {}
     """The same [rad]; a joint is in one of these tables."""
 
-    posture_m: dict[str, Number] = {}
+    posture_m: dict[str, float] = {}
     """Start positions of sliding joints [m]."""
 
-    still: list[str] = []
-    """Joints that move along the path only if the others cannot do it alone."""
+    still: list[str] = same(Robot, "still")
 
     torque_limit_nm: dict[str, Positive] = {}
     """Torque limits by joint [N m], where they are to be lower than the description says."""
@@ -54,18 +49,13 @@ class RobotTable(Placed):
     speed_limit_m_s: dict[str, Positive] = {}
     """Speed limits of sliding joints [m/s]."""
 
-    start_deviation: NotNegative = 1e-4
-    """Standard deviation of the real start posture from the planned one [rad or m]."""
-
-
-Angle = Annotated[Number, Gt(0.0), Lt(180.0)]
+    start_deviation: NotNegative = same(Robot, "start_deviation")
 
 
 class TurnTable(Table):
     """A turn about an edge of the box, or about an axis."""
 
-    angle_deg: Angle = 90.0
-    """Tilt at the end [deg]."""
+    angle_deg: Angle = same(Pivot, "angle_deg")
 
     edge: Annotated[list[Corner], Len(2, 2)] | None = None
     """Two corners of the box; it turns about the line from the first to the second, by the
@@ -91,11 +81,9 @@ class ScrewTable(TurnTable):
     kind: Literal["screw"]
     """tilt, screw or poses."""
 
-    pitch_m_per_rad: Number = 0.0
-    """Advance along the axis [m/rad]."""
+    pitch_m_per_rad: float = same(Pivot, "pitch")
 
-    travel_m: Vector3 = [0.0, 0.0, 0.0]
-    """Translation on top, in proportion to the tilt, at the end [m]."""
+    travel_m: Vector3 = same(Pivot, "travel")
 
 
 class PoseTable(Placed):
@@ -125,3 +113,30 @@ AnyPath = Annotated[
     | Annotated[PosesTable, Tag("poses")],
     Discriminator(_kind),
 ]
+
+
+After = Literal["leave", "hold"]
+
+
+class ManoeuvreTable(Table):
+    """Timing of the phases: approach, touch, grip, tilt, and what comes then."""
+
+    approach_s: Duration = _APPROACH.duration_s
+    """Duration in which the hands come near [s]."""
+
+    touch_s: Duration = _TOUCH.duration_s
+    """Duration of the last 5 mm to their contacts [s]: heavy links touch hard."""
+
+    grip_s: Duration = _GRIP.duration_s
+    """Duration in which the grip builds up [s]."""
+
+    tilt_s: Duration = TILT[0].duration_s
+    """Duration of the tilt [s]."""
+
+    after: After = "hold"
+    """What comes after the tilt: hold holds the object, leave sets it down and withdraws."""
+
+    standoff_m: Gap = same(Scenario, "standoff")
+
+    phases: list[FromTable[Phase]] | None = None
+    """All phases one by one, instead of durations and after."""

@@ -6,11 +6,14 @@ as comments. Units stand in the names of the keys.
 
 from __future__ import annotations
 
-from typing import Annotated, Literal
+from functools import reduce
+from operator import or_
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from annotated_types import Len
 from pydantic import Field
 
+from fulcrum.scenarios.schema.derive import FromTable, derived, same
 from fulcrum.scenarios.schema.keys import (
     Colour,
     Corner,
@@ -19,34 +22,26 @@ from fulcrum.scenarios.schema.keys import (
     Name,
     Place2,
     Placed,
-    Positive,
     Size3,
     Table,
-    Text,
     Vector3,
 )
-from fulcrum.scenarios.schema.motion import AnyPath, RobotTable
-from fulcrum.scenarios.schema.settings import (
-    ControlTable,
-    ManoeuvreTable,
-    PhysicsTable,
-    TolerancesTable,
-    ViewTable,
-)
-
-
-class FrictionTable(Table):
-    """Coulomb friction of a pair of surfaces."""
-
-    mu: Positive
-    """Coefficient of friction [-]."""
-
-    torsion_m: Positive | None = None
-    """Torsional over tangential friction [m], of a soft contact; a hard point without it."""
+from fulcrum.scenarios.schema.motion import After, AnyPath, ManoeuvreTable, RobotTable
+from fulcrum.sim.geometry.geom import Geom
+from fulcrum.sim.geometry.shape import COLOR, Shape
+from fulcrum.sim.geometry.shapes import Box, Cylinder, HollowCylinder, MeshShape
+from fulcrum.sim.scenario.contacts import Friction
+from fulcrum.sim.scenario.control import Control
+from fulcrum.sim.scenario.physics import Physics, Tolerances
+from fulcrum.sim.scenario.scenario import Scenario, View
+from fulcrum.synthesis.settings import Positive, Text
 
 
 class ObjectTable(Placed):
     """The thing that is tilted. It needs exactly one of weight_n, mass_kg, density_kg_per_m3."""
+
+    shape: str
+    """box, cylinder, hollow-cylinder or mesh."""
 
     name: Name = "object"
     """What it is called."""
@@ -67,74 +62,31 @@ class ObjectTable(Placed):
     """Principal moments of inertia about the centre of mass, along the object's axes [kg m^2];
     those of the homogeneous shape, if they are left out."""
 
-    rgba: Colour = [0.80, 0.62, 0.40, 0.5]
+    rgba: Colour = list(COLOR)
     """Colour and opacity."""
 
 
-class BoxTable(ObjectTable):
-    """A box; its frame is at its middle."""
-
-    shape: Literal["box"]
-    """box, cylinder, hollow-cylinder or mesh."""
-
-    size_m: Size3
-    """Lengths of its edges along its x, y and z [m]."""
+SHAPES: dict[str, type[Shape]] = {
+    "box": Box,
+    "cylinder": Cylinder,
+    "hollow-cylinder": HollowCylinder,
+    "mesh": MeshShape,
+}
 
 
-Axis = Literal["x", "y", "z"]
+def _object_table(name: str, shape: type[Shape]) -> type[ObjectTable]:
+    """The table of an object with a shape: keys of any object, and those of the shape."""
+    tag: Any = (Literal[name], Field(description=ObjectTable.model_fields["shape"].description))
+    return derived(f"{shape.__name__}Table", ObjectTable, shape, shape=tag)
 
 
-class CylinderTable(ObjectTable):
-    """A solid cylinder; its frame is at its middle."""
-
-    shape: Literal["cylinder"]
-    """box, cylinder, hollow-cylinder or mesh."""
-
-    radius_m: Positive
-    """Radius [m]."""
-
-    length_m: Positive
-    """Length [m]."""
-
-    axis: Axis = "z"
-    """Which of the object's axes is the cylinder's."""
-
-
-class HollowCylinderTable(ObjectTable):
-    """A hollow cylinder, open at both ends; its frame is at its middle."""
-
-    shape: Literal["hollow-cylinder"]
-    """box, cylinder, hollow-cylinder or mesh."""
-
-    outer_radius_m: Positive
-    """Outer radius [m]."""
-
-    inner_radius_m: Positive
-    """Inner radius [m]."""
-
-    length_m: Positive
-    """Length [m]."""
-
-    axis: Axis = "z"
-    """Which of the object's axes is the cylinder's."""
-
-
-class MeshTable(ObjectTable):
-    """A closed surface from a file; its frame is the file's."""
-
-    shape: Literal["mesh"]
-    """box, cylinder, hollow-cylinder or mesh."""
-
-    file: Text
-    """STL, OBJ or PLY file, relative to this file and in or below its folder."""
-
-    scale: Positive = 1.0
-    """Metres per unit of the file."""
-
-
-AnyObject = Annotated[
-    BoxTable | CylinderTable | HollowCylinderTable | MeshTable, Field(discriminator="shape")
-]
+if TYPE_CHECKING:
+    AnyObject = ObjectTable
+else:
+    AnyObject = Annotated[
+        reduce(or_, [_object_table(*item) for item in SHAPES.items()]),
+        Field(discriminator="shape"),
+    ]
 
 
 class SurfaceTable(Placed):
@@ -151,10 +103,10 @@ class SurfaceTable(Placed):
     facing: Literal["+x", "-x", "+y", "-y"] | None = None
     """Where the front of a wall looks; -x if it is left out."""
 
-    friction: FrictionTable | None = None
+    friction: FromTable[Friction] | None = None
     """Between it and the object. Without, the object passes through it."""
 
-    solid: bool = True
+    solid: bool = Geom.solid
     """Whether the robots must keep clear of it."""
 
     rgba: Colour = [0.75, 0.77, 0.80, 1.0]
@@ -196,7 +148,7 @@ class HandTable(Table):
     may_touch: list[Face] | None = None
     """Faces to which `fulcrum place` may move it; its own, if they are left out."""
 
-    friction: FrictionTable
+    friction: FromTable[Friction]
     """Between tip and object."""
 
     grip_limit_n: Positive | None = None
@@ -226,8 +178,7 @@ class SupportTable(Table):
 class ScenarioFile(Table):
     """A scenario: what is tilted, on what, by whom, along which path, and what is success."""
 
-    summary: Text
-    """One line for `fulcrum list`."""
+    summary: Text = same(Scenario, "summary")
 
     object: AnyObject
     """The thing that is tilted."""
@@ -247,30 +198,28 @@ class ScenarioFile(Table):
     path: AnyPath
     """How the object is to move."""
 
-    holdable: bool = True
-    """Whether forces that hold the object are expected all along the path."""
+    holdable: bool = same(Scenario, "holdable")
 
     manoeuvre: ManoeuvreTable = ManoeuvreTable()
     """Timing of the phases."""
 
-    control: ControlTable = ControlTable()
+    control: FromTable[Control] = Field(default_factory=Control)
     """How forces are synthesised and followed."""
 
-    physics: PhysicsTable = PhysicsTable()
+    physics: FromTable[Physics] = Field(default_factory=Physics)
     """Settings of the contact solver."""
 
-    tolerances: TolerancesTable = TolerancesTable()
+    tolerances: FromTable[Tolerances] = Field(default_factory=Tolerances)
     """What counts as success."""
 
-    view: ViewTable = ViewTable()
+    view: FromTable[View] = Field(default_factory=View)
     """Where recordings look from."""
 
 
 class LiftedFile(Table):
     """A scenario like another one, without the environment's help: the object is to come off."""
 
-    summary: Text
-    """One line for `fulcrum list`."""
+    summary: Text = same(Scenario, "summary")
 
     lifted_from: Text
     """The other one: its name, or its file relative to this one."""
@@ -278,5 +227,5 @@ class LiftedFile(Table):
     travel_m: Vector3 = [0.0, 0.0, 0.1]
     """Translation on top of the tilt, in proportion to it, at the end [m]."""
 
-    after: Literal["leave", "hold"] = "hold"
+    after: After = "hold"
     """What comes after the tilt."""

@@ -7,6 +7,9 @@ from typing import Annotated, Any, Literal, Union, get_args, get_origin
 
 from pydantic import BaseModel
 
+from fulcrum.scenarios.schema.derive import table_of
+from fulcrum.synthesis.settings import Settings
+
 
 def table_at(model: type[BaseModel], loc: tuple[str | int, ...]) -> type[BaseModel]:
     """The model of the table in which a location ends."""
@@ -34,8 +37,10 @@ def members(annotations: list[Any]) -> list[Any]:
 
 
 def tables(annotations: list[Any]) -> list[type[BaseModel]]:
-    """The models among annotations."""
-    return [a for a in annotations if isinstance(a, type) and issubclass(a, BaseModel)]
+    """The models among annotations, and those of settings classes."""
+    types = [a for a in annotations if isinstance(a, type)]
+    found = [table_of(a) if issubclass(a, Settings) else a for a in types]
+    return [a for a in found if issubclass(a, BaseModel)]
 
 
 def steps(annotation: Any, part: str | int) -> list[Any]:

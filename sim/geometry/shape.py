@@ -12,6 +12,7 @@ from fulcrum.sim.geometry.pose import Quaternion, triple
 from fulcrum.synthesis import InvalidInputError
 from fulcrum.synthesis.arrays import Array, Vector
 from fulcrum.synthesis.checks import vector
+from fulcrum.synthesis.settings import Settings
 
 Color: TypeAlias = tuple[float, float, float, float]
 
@@ -34,11 +35,16 @@ class Place(NamedTuple):
     face: str
 
 
-class Shape(ABC):
+class Shape(Settings, ABC):
     """A shape in the object's frame, whose origin is its middle (of a mesh: that of its file).
 
     Its faces have names; a place on a face is said by two coordinates u and v in [0, 1].
     """
+
+    @property
+    def label(self) -> str:
+        """What errors call the shape."""
+        return "shape"
 
     @property
     @abstractmethod

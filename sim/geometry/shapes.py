@@ -6,6 +6,7 @@ import math
 from abc import abstractmethod
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import Annotated, Literal
 
 import numpy as np
 from scipy.spatial.transform import Rotation
@@ -16,13 +17,16 @@ from fulcrum.sim.geometry.pose import Pose, Quaternion, triple, wxyz
 from fulcrum.sim.geometry.shape import AXES, COLOR, UNTURNED, Color, Place, Shape, cyclic
 from fulcrum.synthesis import InvalidInputError
 from fulcrum.synthesis.arrays import Array, Vector
-from fulcrum.synthesis.checks import length, positive
+from fulcrum.synthesis.settings import Key, Positive, Text
+
+Axis = Literal["x", "y", "z"]
+Length = Annotated[Positive, Key("length_m")]
 
 # Flat pieces of a hollow cylinder's wall. Their middles lie on its surfaces; where two meet, they
 # are 0.5 % of the radius, R (1 - cos(pi / 32)), inside the outer one.
 _STAVES = 32
 # What turns the z axis to the axis of a name.
-_TURNS: dict[str, Quaternion] = {
+_TURNS: dict[Axis, Quaternion] = {
     "x": (math.sqrt(0.5), 0.0, math.sqrt(0.5), 0.0),
     "y": (math.sqrt(0.5), -math.sqrt(0.5), 0.0, 0.0),
     "z": UNTURNED,
@@ -31,20 +35,13 @@ _TURNS: dict[str, Quaternion] = {
 
 @dataclass(frozen=True)
 class Box(Shape):
-    """A cuboid along the object's axes; faces "+x", "-x", "+y", "-y", "+z", "-z".
+    """A cuboid along the object's axes, about its origin; faces "+x", "-x", "+y", "-y", "+z", "-z".
 
     On a face across an axis u runs along the next one (after z comes x), v along the third.
-
-    Attributes:
-        size: Lengths along x, y, z [m].
     """
 
-    size: Vector
-
-    def __post_init__(self) -> None:
-        length("shape.size", self.size, 3)
-        for side in self.size:
-            positive("shape.size", side)
+    size: Annotated[tuple[Positive, Positive, Positive], Key("size_m")]
+    """Lengths of its edges along its x, y and z [m]."""
 
     @property
     def faces(self) -> tuple[str, ...]:
@@ -89,18 +86,13 @@ class Box(Shape):
 class _Round(Shape):
     """What full and hollow cylinders share: walls about an axis, and two ends."""
 
-    length: float
-    axis: str
+    length: Length
+    axis: Axis
 
     @property
     @abstractmethod
     def _walls(self) -> dict[str, float]:
         """Radius [m] of every wall, by the name of its face; the outer one is the first."""
-
-    def _check(self) -> None:
-        positive("shape.length", self.length)
-        if self.axis not in _TURNS:
-            raise InvalidInputError("shape.axis", self.axis, f"one of {', '.join(_TURNS)}")
 
     @property
     def faces(self) -> tuple[str, ...]:
@@ -166,23 +158,20 @@ class _Round(Shape):
 
 @dataclass(frozen=True)
 class Cylinder(_Round):
-    """A solid cylinder; faces "side" and the ends, "+z" and "-z" with the default axis.
+    """A solid cylinder about the origin; faces "side" and the ends, by default "+z" and "-z".
 
     On the side u goes round, beginning at the axis after its own (x after z), and v along it; on an
     end u goes round, too, and v from the middle to the rim.
-
-    Attributes:
-        radius, length: [m].
-        axis: The object's axis that is its own: "x", "y" or "z".
     """
 
-    radius: float
-    length: float
-    axis: str = "z"
+    radius: Annotated[Positive, Key("radius_m")]
+    """Radius [m]."""
 
-    def __post_init__(self) -> None:
-        positive("shape.radius", self.radius)
-        self._check()
+    length: Length
+    """Length [m]."""
+
+    axis: Axis = "z"
+    """Which of the object's axes is the cylinder's."""
 
     @property
     def _walls(self) -> dict[str, float]:
@@ -199,28 +188,29 @@ class Cylinder(_Round):
 
 @dataclass(frozen=True)
 class HollowCylinder(_Round):
-    """A tube with open ends; faces "outside", "inside" and the ends, "+z" and "-z" by default.
+    """A tube about the origin; faces "outside", "inside" and the ends, by default "+z" and "-z".
 
     Coordinates are as a :class:`Cylinder`'s, but that v on an end goes from the bore to the rim,
     and u on a wall in steps: what hands hold are flat staves, which are touched in their middles.
-
-    Attributes:
-        outer_radius, inner_radius, length: [m].
-        axis: The object's axis that is its own: "x", "y" or "z".
     """
 
-    outer_radius: float
-    inner_radius: float
-    length: float
-    axis: str = "z"
+    outer_radius: Annotated[Positive, Key("outer_radius_m")]
+    """Outer radius [m]."""
+
+    inner_radius: Annotated[Positive, Key("inner_radius_m")]
+    """Inner radius [m]."""
+
+    length: Length
+    """Length [m]."""
+
+    axis: Axis = "z"
+    """Which of the object's axes is the cylinder's."""
 
     def __post_init__(self) -> None:
-        positive("shape.outer_radius", self.outer_radius)
-        positive("shape.inner_radius", self.inner_radius)
+        super().__post_init__()
         if not self.inner_radius < self.outer_radius:
             valid = f"less than the outer_radius of {self.outer_radius:g} m"
             raise InvalidInputError("shape.inner_radius", self.inner_radius, valid)
-        self._check()
 
     @property
     def _walls(self) -> dict[str, float]:
@@ -279,17 +269,16 @@ class MeshShape(Shape):
     Contacts touch the mesh's convex hull, so that places in its hollows are no contacts. On the
     surface u goes round the z axis through the centre of mass, beginning at x, and v from its
     lower to its upper end; counted is the outermost point in that direction.
-
-    Attributes:
-        file: STL, OBJ or PLY.
-        scale: Metres per unit of the file [m].
     """
 
-    file: str
-    scale: float = 1.0
+    file: Text
+    """STL, OBJ or PLY file, relative to this file and in or below its folder."""
+
+    scale: Positive = 1.0
+    """Metres per unit of the file."""
 
     def __post_init__(self) -> None:
-        positive("shape.scale", self.scale)
+        super().__post_init__()
         self.mesh  # noqa: B018 - raises where it is no mesh
 
     @cached_property

@@ -92,19 +92,7 @@ class ScrewPath(ObjectPath):
     """
 
     def __init__(self, pivot: Pivot) -> None:
-        length = float(np.linalg.norm(pivot.axis_W))
-        if not (np.isfinite(length) and length > 0.0):
-            raise InvalidInputError("path.axis_W", pivot.axis_W, "a finite vector that is not zero")
-        for name, value in (
-            ("point_W", pivot.point_W),
-            ("pitch", pivot.pitch),
-            ("travel", pivot.travel),
-        ):
-            if not np.isfinite(value).all():
-                raise InvalidInputError(f"path.{name}", value, "finite numbers")
-        if not 0.0 < pivot.angle_deg < 180.0:
-            raise InvalidInputError("path.angle_deg", pivot.angle_deg, "in (0, 180) deg")
-        self.direction = np.asarray(pivot.axis_W, float) / length
+        self.direction = np.asarray(pivot.axis_W, float) / float(np.linalg.norm(pivot.axis_W))
         self.end = float(np.radians(pivot.angle_deg))
         self.point = np.asarray(pivot.point_W, float)
         # Translation per radian on top of the turn [m].

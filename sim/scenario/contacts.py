@@ -4,33 +4,24 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import Annotated
 
 from fulcrum.sim.geometry.pose import Pose
 from fulcrum.synthesis import InvalidInputError
 from fulcrum.synthesis.arrays import Vector
-from fulcrum.synthesis.checks import axes, positive, vector
-
-if TYPE_CHECKING:
-    pass
+from fulcrum.synthesis.checks import axes, vector
+from fulcrum.synthesis.settings import Key, Positive, Settings
 
 
 @dataclass(frozen=True)
-class Friction:
-    """Coulomb friction with the ellipticities of the paper's (1) and (2).
+class Friction(Settings):
+    """Coulomb friction of a pair of surfaces, with the ellipticities of the paper's (1) and (2)."""
 
-    Attributes:
-        mu: Coefficient [-].
-        e_n: Torsional over tangential friction [m]; None for a contact that carries no torsion.
-    """
+    mu: Positive
+    """Coefficient of friction [-]."""
 
-    mu: float
-    e_n: float | None = None
-
-    def __post_init__(self) -> None:
-        positive("friction.mu", self.mu)
-        if self.e_n is not None:
-            positive("friction.e_n", self.e_n)
+    e_n: Annotated[Positive | None, Key("torsion_m")] = None
+    """Torsional over tangential friction [m], of a soft contact; a hard point without it."""
 
 
 @dataclass(frozen=True)

@@ -3,113 +3,115 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from typing import Annotated
+
+from annotated_types import Ge, Gt, Le
 
 from fulcrum.synthesis import InvalidInputError, Objective
-from fulcrum.synthesis.checks import each, not_negative, whole
 from fulcrum.synthesis.robust.uncertainty_set import UncertaintySet
+from fulcrum.synthesis.settings import Inline, Key, NotNegative, OrInfinite, Settings
 
 
 @dataclass(frozen=True)
-class Robustness:
-    """What a grip is to bear.
+class Robustness(Settings):
+    """What a grip is to bear."""
 
-    Attributes:
-        uncertainty: The worlds that it serves, with the true friction.
-        preload: Least normal force of the hands [N], against pushes that no grip alone withstands:
-            stiff hands and their friction do.
-        reaction: By how much harder the hands may press while the impedance holds more than was
-            expected [N].
-    """
+    uncertainty: Annotated[UncertaintySet, Inline] = UncertaintySet()
+    """The worlds that it serves, with the true friction."""
 
-    uncertainty: UncertaintySet
-    preload: float
-    reaction: float = 0.0
+    preload: Annotated[NotNegative, Key("preload_n")] = 0.0
+    """Least normal force of the hands [N], against pushes that no grip alone withstands: stiff
+    hands and their friction do."""
 
-    def __post_init__(self) -> None:
-        not_negative("robustness.preload", self.preload)
-        not_negative("robustness.reaction", self.reaction)
+    reaction: Annotated[NotNegative, Key("reaction_n")] = 0.0
+    """By how much harder the hands may press while the impedance holds more than was expected
+    [N]."""
 
 
-def _threshold(field: str, value: float) -> None:
-    if not value > 0.0:
-        raise InvalidInputError(field, value, "a number > 0")
+# An infinite threshold is none.
+Threshold = Annotated[float, Gt(0), OrInfinite]
 
 
 @dataclass(frozen=True)
-class Guard:
-    """When a run counts as in trouble (:mod:`sim.control.guard`); an infinite threshold is none.
+class Guard(Settings):
+    """When a run counts as in trouble."""
 
-    Attributes:
-        silence_s: How long the drives go on without a setpoint [s].
-        no_forces_s: How long the synthesis may find no forces [s].
-        blind_s: How long the object's pose may be missing [s].
-        tilt_error_deg: Tilt error, low-pass filtered [deg].
-        joint_error: Deviation of a joint from its path [rad or m], if it is also pulled hard.
-        joint_pull: Torque with which the impedance pulls it, as a share of its limit [-].
-        saturated_s: How long a torque may be cut at its limit while there is grip [s].
-        torque_error: Motor's torque against the commanded one, as a share of its limit [-].
-        contact_error: Distance of a hand's tip from its contact on the object as seen [m].
-        hold_s: How long a hold waits for a cause to pass [s].
-        holds_s: How long all holds of a run may take together [s].
-        lower_s: How long lowering may be blocked [s].
-    """
+    silence_s: Threshold = 0.05
+    """How long the drives go on without a setpoint [s]."""
 
-    silence_s: float = 0.05
-    no_forces_s: float = 0.1
-    blind_s: float = 0.05
-    tilt_error_deg: float = 6.0
-    joint_error: float = 0.1
-    joint_pull: float = 0.3
-    saturated_s: float = 0.05
-    torque_error: float = 0.25
-    contact_error: float = 0.05
-    hold_s: float = 0.5
-    holds_s: float = 5.0
-    lower_s: float = 2.0
+    no_forces_s: Threshold = 0.1
+    """How long the synthesis may find no forces [s]."""
 
-    def __post_init__(self) -> None:
-        each("guard", self, _threshold)
+    blind_s: Threshold = 0.05
+    """How long the object's pose may be missing [s]."""
+
+    tilt_error_deg: Threshold = 6.0
+    """Tilt error, low-pass filtered [deg]."""
+
+    joint_error: Threshold = 0.1
+    """Deviation of a joint from its path [rad or m], if it is also pulled hard."""
+
+    joint_pull: Threshold = 0.3
+    """Torque with which the impedance pulls it, as a share of its limit [-]."""
+
+    saturated_s: Threshold = 0.05
+    """How long a torque may be cut at its limit while there is grip [s]."""
+
+    torque_error: Threshold = 0.25
+    """Motor's torque against the commanded one, as a share of its limit [-]."""
+
+    contact_error: Annotated[Threshold, Key("contact_error_m")] = 0.05
+    """Distance of a hand's tip from its contact on the object as seen [m]."""
+
+    hold_s: Threshold = 0.5
+    """How long a hold waits for a cause to pass [s]."""
+
+    holds_s: Threshold = 5.0
+    """How long all holds of a run may take together [s]."""
+
+    lower_s: Threshold = 2.0
+    """How long lowering may be blocked [s]."""
 
 
 @dataclass(frozen=True)
-class Control:
-    """How forces are synthesised and followed.
+class Control(Settings):
+    """How forces are synthesised and followed by controller margin; the others are made of it."""
 
-    Attributes:
-        friction_factor: Share of the believed friction that the synthesis may use [-]; 1 puts the
-            optimum on the cone, where it slips.
-        preload: Lower bound of the hands' normal forces [N].
-        objective: What the synthesis minimises.
-        feedforward: Whether synthesised torques are applied at all.
-        solve_every: Physics steps per synthesis.
-        bandwidth: Natural frequency of the joint impedance, which is critically damped [rad/s].
-        yielding_squeeze: Whether the impedance leaves the hands' squeeze to the feed-forward.
-        robustness: What the grip has to bear beyond the belief; None for the fixed margins of
-            ``friction_factor`` and ``preload`` alone.
-        inertia: Whether forces and torques also accelerate object and robot as the path's timing
-            asks; else both are those of rest.
-        pose_filter_s: Time constant with which the object's measured pose is smoothed [s].
-        guard: When the run is held, lowered or stopped.
-    """
+    friction_factor: Annotated[float, Gt(0), Le(1.0)] = 0.8
+    """Share of the believed friction that the synthesis may use [-]; 1 puts the optimum on the
+    cone, where it slips."""
 
-    friction_factor: float = 0.8
-    preload: float = 5.0
+    preload: Annotated[NotNegative, Key("preload_n")] = 5.0
+    """Least normal force of the hands [N]."""
+
     objective: Objective = Objective.MAX_NORMAL_FORCE
-    feedforward: bool = True
-    solve_every: int = 4
-    bandwidth: float = 30.0
-    yielding_squeeze: bool = False
-    robustness: Robustness | None = None
-    inertia: bool = False
-    pose_filter_s: float = 0.0
-    guard: Guard = Guard()
+    """What the synthesis minimises."""
 
-    def __post_init__(self) -> None:
-        if not 0.0 < self.friction_factor <= 1.0:
-            raise InvalidInputError("control.friction_factor", self.friction_factor, "in (0, 1]")
-        for name in ("preload", "bandwidth", "pose_filter_s"):
-            not_negative(f"control.{name}", getattr(self, name))
-        whole("control.solve_every", self.solve_every, least=1)
+    feedforward: bool = True
+    """Whether synthesised torques are applied at all."""
+
+    solve_every: Annotated[int, Ge(1)] = 4
+    """Physics steps per synthesis."""
+
+    bandwidth: Annotated[NotNegative, Key("bandwidth_rad_s")] = 30.0
+    """Natural frequency of the joint impedance, which is critically damped [rad/s]."""
+
+    yielding_squeeze: bool = False
+    """Whether the impedance leaves the hands' squeeze to the feed-forward."""
+
+    robustness: Robustness | None = None
+    """What the grip has to bear beyond the fixed margins of friction_factor and preload_n;
+    controller robust has its own."""
+
+    inertia: bool = False
+    """Whether forces and torques also accelerate object and robot as the path's timing asks; else
+    both are those of rest."""
+
+    pose_filter_s: NotNegative = 0.0
+    """Time constant with which the object's measured pose is smoothed [s]."""
+
+    guard: Guard = Guard()
+    """When the run is held, lowered or stopped."""
 
 
 _ROBUSTNESS = Robustness(

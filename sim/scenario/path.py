@@ -4,44 +4,56 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import Annotated
 
 import numpy as np
+from annotated_types import Gt, Lt
 from scipy.spatial.transform import Rotation
 
 from fulcrum.sim.geometry.pose import Pose, triple
 from fulcrum.synthesis import InvalidInputError
 from fulcrum.synthesis.arrays import Array, Vector
-from fulcrum.synthesis.checks import length
+from fulcrum.synthesis.settings import Settings
 
 # The tilt is an angle: where the object does not turn, it would stand still [deg].
 _LEAST_TURN_DEG = 0.01
 # A measured orientation has to say where on the path the object is.
 _MOST_DEG = 180.0
+Angle = Annotated[float, Gt(0), Lt(_MOST_DEG)]
 
 
 @dataclass(frozen=True)
-class Pivot:
-    """The path of the object: a screw motion about an axis fixed in the world.
-
-    Attributes:
-        start: Pose of the object at tilt 0.
-        point_W: A point on the axis [m].
-        axis_W: Direction of the axis; the tilt is positive by the right-hand rule.
-        angle_deg: Tilt at the end [deg].
-        pitch: Advance along the axis per radian [m].
-        travel: Translation on top of the screw, in proportion to the tilt, at the end [m].
-    """
+class Pivot(Settings):
+    """The path of the object: a screw motion about an axis fixed in the world."""
 
     start: Pose
+    """Pose of the object at tilt 0."""
+
     point_W: Vector
+    """A point on the axis [m]."""
+
     axis_W: Vector
-    angle_deg: float = 90.0
+    """Direction of the axis; the tilt is positive by the right-hand rule."""
+
+    angle_deg: Angle = 90.0
+    """Tilt at the end [deg]."""
+
     pitch: float = 0.0
+    """Advance along the axis [m/rad]."""
+
     travel: Vector = (0.0, 0.0, 0.0)
+    """Translation on top, in proportion to the tilt, at the end [m]."""
+
+    @property
+    def label(self) -> str:
+        """What errors call the path."""
+        return "path"
 
     def __post_init__(self) -> None:
-        for name in ("point_W", "axis_W", "travel"):
-            length(f"path.{name}", getattr(self, name), 3)
+        length = np.linalg.norm(self.axis_W)
+        if not (np.isfinite(length) and length > 0.0):
+            raise InvalidInputError("path.axis_W", self.axis_W, "a finite vector that is not zero")
+        super().__post_init__()
 
     def scaled(self, factor: float) -> Pivot:
         """That of an object which is so many times as large, about the same axis."""

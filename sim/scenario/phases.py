@@ -4,54 +4,54 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
+from typing import Annotated
+
+from annotated_types import Gt, Le
 
 from fulcrum.sim.scenario.timing import Timing
 from fulcrum.synthesis import InvalidInputError
+from fulcrum.synthesis.settings import Key, NotNegative, Settings, Share, Text
 
-# A trace takes about 2 kB per step: a gigabyte in this time [s].
-_LONGEST_S = 600.0
-
-
-# No arm reaches farther, and the joint path takes a step every 5 mm [m].
-FARTHEST_M = 10.0
+# A trace takes about 2 kB per step: a gigabyte in ten minutes.
+Duration = Annotated[float, Gt(0), Le(600.0)]
+# No arm reaches farther, and the joint path takes a step every 5 mm.
+Gap = Annotated[NotNegative, Le(10.0)]
 
 
 @dataclass(frozen=True)
-class Phase:
-    """A stretch of the manoeuvre: what it brings tilt, hands and grip to.
+class Phase(Settings):
+    """A stretch of the manoeuvre: what it brings tilt, hands and grip to."""
 
-    Attributes:
-        name: What people call it.
-        duration_s: [s].
-        tilt: Share of the path's angle at the end [-], 0 to 1.
-        gap: Distance of the tips from their contacts, along the outward normals, at the end [m].
-        grip: Share of the synthesised forces that is applied at the end [-], 0 to 1.
-        timing: How it goes there, in that duration; None for minimum jerk.
-    """
+    name: Text
+    """What it is called."""
 
-    name: str
-    duration_s: float
-    tilt: float
-    gap: float
-    grip: float
-    timing: Timing | None = None
+    duration_s: Duration
+    """Duration [s]."""
+
+    tilt: Share
+    """Share of the path at the end [-]."""
+
+    gap: Annotated[Gap, Key("gap_m")]
+    """Distance of the tips from their contacts, along the outward normals, at the end [m]."""
+
+    grip: Share
+    """Share of the synthesised forces that is applied at the end [-]."""
+
+    timing: Annotated[Timing | None, Key(None)] = None
+    """How it goes there, in that duration; None for minimum jerk."""
+
+    @property
+    def label(self) -> str:
+        """What errors call the phase."""
+        return f"phase {self.name}"
 
     def __post_init__(self) -> None:
-        where = f"phase {self.name}"
-        if not 0.0 < self.duration_s <= _LONGEST_S:
-            valid = f"a duration > 0 s and <= {_LONGEST_S:g} s"
-            raise InvalidInputError(f"{where}.duration_s", self.duration_s, valid)
-        for field in ("tilt", "grip"):
-            if not 0.0 <= getattr(self, field) <= 1.0:
-                raise InvalidInputError(f"{where}.{field}", getattr(self, field), "in [0, 1]")
-        if not 0.0 <= self.gap <= FARTHEST_M:
-            valid = f"a finite distance >= 0 m and <= {FARTHEST_M:g} m"
-            raise InvalidInputError(f"{where}.gap", self.gap, valid)
+        super().__post_init__()
         if self.gap > 0.0 and self.grip > 0.0:
-            raise InvalidInputError(f"{where}.grip", self.grip, "0 while there is a gap")
+            raise InvalidInputError(f"{self.label}.grip", self.grip, "0 while there is a gap")
         if self.timing is not None and not math.isclose(self.duration_s, self.timing.duration):
             valid = f"its timing's {self.timing.duration:g} s"
-            raise InvalidInputError(f"{where}.duration_s", self.duration_s, valid)
+            raise InvalidInputError(f"{self.label}.duration_s", self.duration_s, valid)
 
 
 STANDOFF = 0.06  # [m] of the hands from the object before and after they hold it

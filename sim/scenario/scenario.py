@@ -3,48 +3,40 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
+from typing import Annotated
 
 from fulcrum.sim.geometry.geom import Geom
 from fulcrum.sim.geometry.object import Object
 from fulcrum.sim.scenario.contacts import Hand, Rest, Support
 from fulcrum.sim.scenario.control import Control
 from fulcrum.sim.scenario.path import Pivot, Poses
-from fulcrum.sim.scenario.phases import FARTHEST_M, HOLD, REACH, STANDOFF, TILT, Phase
+from fulcrum.sim.scenario.phases import HOLD, REACH, STANDOFF, TILT, Gap, Phase
 from fulcrum.sim.scenario.physics import Physics, Tolerances
 from fulcrum.sim.scenario.robot import Robot
 from fulcrum.synthesis import InvalidInputError
 from fulcrum.synthesis.arrays import Vector
-from fulcrum.synthesis.checks import not_negative
-
-if TYPE_CHECKING:
-    pass
+from fulcrum.synthesis.settings import Key, Settings, check
 
 
 @dataclass(frozen=True)
-class View:
-    """Where recordings look from, relative to the path's point [m].
+class View(Settings):
+    """Where recordings look from, relative to the path's point."""
 
-    Attributes:
-        eye: Where the eye stands.
-        target: What it looks at.
-    """
+    eye: Annotated[Vector, Key("eye_m")] = (1.0, -0.5, 0.62)
+    """Where the eye stands [m]."""
 
-    eye: Vector = (1.0, -0.5, 0.62)
-    target: Vector = (0.05, 0.0, 0.12)
+    target: Annotated[Vector, Key("target_m")] = (0.05, 0.0, 0.12)
+    """What it looks at [m]."""
 
 
 @dataclass(frozen=True)
 class Scenario:
-    """Everything that a run needs to know; nothing else may distinguish one scene from another.
-
-    ``holdable`` says whether forces that hold the object are expected to exist all along the path;
-    a scenario that shows the contrary says False. ``rests`` is where the object may lie besides
-    its supports, ``standoff`` the distance of the hands from their contacts at the start [m].
-    """
+    """Everything that a run needs to know; nothing else may distinguish one scene from another."""
 
     name: str
     summary: str
+    """One line for `fulcrum list`."""
+
     object: Object
     environment: tuple[Geom, ...]
     hands: tuple[Hand, ...]
@@ -52,18 +44,22 @@ class Scenario:
     robots: tuple[Robot, ...]
     path: Pivot | Poses
     rests: tuple[Rest, ...] = ()
+    """Where the object may lie besides its supports."""
+
     phases: tuple[Phase, ...] = (*REACH, *TILT, *HOLD)
     standoff: float = STANDOFF
+    """Distance of the hands from their contacts at the start [m]."""
+
     holdable: bool = True
+    """Whether forces that hold the object are expected all along the path."""
+
     control: Control = Control()
     physics: Physics = Physics()
     tolerances: Tolerances = Tolerances()
     view: View = View()
 
     def __post_init__(self) -> None:
-        not_negative("standoff", self.standoff)
-        if self.standoff > FARTHEST_M:
-            raise InvalidInputError("standoff", self.standoff, f"at most {FARTHEST_M:g} m")
+        check("standoff", Gap, self.standoff)
         if not self.phases:
             raise InvalidInputError("phases", self.phases, "at least one phase")
         for name in self.contact_names:

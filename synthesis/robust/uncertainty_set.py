@@ -21,7 +21,8 @@ from __future__ import annotations
 
 import itertools
 import math
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, replace
+from typing import Annotated
 
 import numpy as np
 from scipy.spatial import ConvexHull, QhullError
@@ -30,44 +31,43 @@ from fulcrum.synthesis.arrays import Array, Indices, N, Vector
 from fulcrum.synthesis.contact import Contact, ContactModel, skew
 from fulcrum.synthesis.errors import InvalidInputError
 from fulcrum.synthesis.problem import Gravity, Joints, Problem
+from fulcrum.synthesis.settings import Fraction, Key, NotNegative, Settings, Spread3
 
 # Points of a hull that differ by less than this share of its size are one: rounding, and no more.
 _SAME = 1e-9
 
 
 @dataclass(frozen=True)
-class UncertaintySet:
+class UncertaintySet(Settings):
     """By how much the worlds may differ from the nominal one.
-
-    Attributes:
-        mass: Share by which the mass may be lower or higher [-], in [0, 1).
-        center: Offset of the centre of mass along each of the object's axes, either way [m].
-        friction: Share by which friction coefficients may be lower [-], in [0, 1).
-        push: Largest push along each of the object's axes, either way [N]; those between are within
-            the hull of these. Pushes of up to P in any direction are within if each is sqrt(3) P.
-        lever: How far from the nominal centre of mass pushes act, along the object's axes [m].
-        placement: Offset of each hand contact along its tangents, either way [m].
 
     Raises:
         InvalidInputError: A field is negative or not finite, or a share is not below 1.
     """
 
-    mass: float = 0.0
-    center: Vector = (0.0, 0.0, 0.0)
-    friction: float = 0.0
-    push: Vector = (0.0, 0.0, 0.0)
-    lever: Vector = (0.0, 0.0, 0.0)
-    placement: float = 0.0
+    mass: Fraction = 0.0
+    """Share by which the mass may be lower or higher [-]."""
 
-    def __post_init__(self) -> None:
-        for field in fields(self):
-            value = getattr(self, field.name)
-            numbers = value if isinstance(value, tuple) else (value,)
-            if not all(math.isfinite(number) and number >= 0.0 for number in numbers):
-                raise InvalidInputError(f"uncertainty.{field.name}", value, "finite and >= 0")
-        for name in ("mass", "friction"):
-            if not getattr(self, name) < 1.0:
-                raise InvalidInputError(f"uncertainty.{name}", getattr(self, name), "below 1")
+    center: Annotated[Spread3, Key("center_m")] = (0.0, 0.0, 0.0)
+    """Offset of the centre of mass along each of the object's axes, either way [m]."""
+
+    friction: Fraction = 0.0
+    """Share by which friction may be lower [-]."""
+
+    push: Annotated[Spread3, Key("push_n")] = (0.0, 0.0, 0.0)
+    """Largest push along each of the object's axes, either way [N]; those between are within the
+    hull of these. Pushes of up to P in any direction are within if each is sqrt(3) P."""
+
+    lever: Annotated[Spread3, Key("lever_m")] = (0.0, 0.0, 0.0)
+    """How far from the nominal centre of mass pushes act, along the object's axes [m]."""
+
+    placement: Annotated[NotNegative, Key("placement_m")] = 0.0
+    """Distance by which hands may miss their contacts along each tangent, either way [m]."""
+
+    @property
+    def label(self) -> str:
+        """What errors call the set."""
+        return "uncertainty"
 
     @property
     def largest_factor(self) -> float:

@@ -100,6 +100,15 @@ BROKEN = {
     "edge of one corner": Broken(
         EDGE, 'edge = ["-x -y -z", "-x -y -z"]', "path.edge", "two different corners"
     ),
+    "edge of points": Broken(
+        EDGE,
+        "edge = [[0, 0.1, 0], [0, -0.1, 0]]",
+        "path.edge[0]",
+        "points go into point_m and axis, as those of meshes must",
+    ),
+    "corner as a point": Broken(
+        'corner = "-x +y -z"', "corner = [-0.15, 0.1, -0.05]", "edge_left.corner", "into point_m"
+    ),
     "axis and edge": Broken(EDGE, f"{EDGE}\naxis = [0, 1, 0]", "path.axis", "left out"),
     "no axis": Broken(EDGE, "point_m = [0.5, 0, 0]", "path.axis", "a direction"),
     "unknown surface": Broken(

@@ -1,29 +1,26 @@
 """Every setting of a scenario has its key in the file, and no text is read without an answer."""
 
+import math
 import random
 import re
 import tomllib
 from dataclasses import fields
 
 import pytest
+from pydantic import TypeAdapter
 
 from fulcrum.scenarios.reading.file import made, read, scene_files
-from fulcrum.scenarios.reading.settings import control, phases, physics, tolerances
 from fulcrum.scenarios.reading.source import FileError, Source
-from fulcrum.scenarios.schema.settings import (
-    ControlTable,
-    GuardTable,
-    ManoeuvreTable,
-    PhysicsTable,
-    RobustnessTable,
-    TolerancesTable,
-)
+from fulcrum.scenarios.schema.derive import FromTable, table_of
 from fulcrum.scenarios.schema.writer import write
+from fulcrum.sim.scenario.contacts import Friction
 from fulcrum.sim.scenario.control import Control, Guard, Robustness
 from fulcrum.sim.scenario.phases import Phase
 from fulcrum.sim.scenario.physics import Physics, Tolerances
+from fulcrum.sim.scenario.scenario import View
 from fulcrum.synthesis import FulcrumError, Objective
 from fulcrum.synthesis.robust.uncertainty_set import UncertaintySet
+from fulcrum.synthesis.settings import Key, hints, said
 from tests.helpers.broken_files import GOOD
 
 
@@ -38,10 +35,18 @@ def other(value):
     return value + 1 if isinstance(value, int) else 0.5 * value or 0.125
 
 
-def changed(table, **tables):
-    """The table with all of its values changed, and with other tables in it."""
-    own = {n: other(getattr(table, n)) for n in type(table).model_fields if n not in tables}
-    return type(table)(**own, **tables)
+def changed(settings, **given):
+    """What a file says that changes every key of a settings class which has a default."""
+    fields = table_of(settings).model_fields.items()
+    return {
+        name: given[name] if name in given else other(field.get_default(call_default_factory=True))
+        for name, field in fields
+    }
+
+
+def read_as(settings, table):
+    """The instance of a settings class that a table of a file stands for."""
+    return TypeAdapter(FromTable[settings]).validate_python(table)
 
 
 def same(config, default):
@@ -50,31 +55,58 @@ def same(config, default):
 
 
 def test_every_setting_has_its_key():
-    guard = changed(GuardTable())
-    own = control(changed(ControlTable(), robustness=changed(RobustnessTable()), guard=guard))
+    inner = {"robustness": changed(Robustness), "guard": changed(Guard)}
+    own = read_as(Control, changed(Control, **inner))
     assert same(own, Control()) == set()
     assert same(own.guard, Guard()) == set()
     assert own.robustness is not None
     assert same(own.robustness, Robustness(UncertaintySet(), preload=0.0)) == set()
     assert same(own.robustness.uncertainty, UncertaintySet()) == set()
-    assert same(physics(changed(PhysicsTable())), Physics()) == set()
-    assert same(tolerances(changed(TolerancesTable())), Tolerances()) == set()
+    for settings in (Physics, Tolerances, View):
+        assert same(read_as(settings, changed(settings)), settings()) == set()
+    assert read_as(Friction, {"mu": 0.5, "torsion_m": 0.01}) == Friction(0.5, e_n=0.01)
 
 
 def test_a_setting_without_a_key_is_noticed():
-    assert same(control(ControlTable(preload_n=7.0)), Control()) == {
+    assert same(read_as(Control, {"preload_n": 7.0}), Control()) == {
         f.name for f in fields(Control) if f.name != "preload"
     }
 
 
 def test_every_part_of_a_phase_but_a_planned_timing_has_its_key():
     table = {"name": "a", "duration_s": 2.0, "tilt": 0.5, "gap_m": 0.0, "grip": 0.25}
-    source = Source(scene_files()["box-tilt"], GOOD)
-    (own,) = phases(source, ManoeuvreTable(phases=[table]))
-    assert own == Phase("a", 2.0, tilt=0.5, gap=0.0, grip=0.25)
+    assert read_as(Phase, table) == Phase("a", 2.0, tilt=0.5, gap=0.0, grip=0.25)
+    assert set(table_of(Phase).model_fields) == set(table)
     assert {f.name for f in fields(Phase)} - {name.removesuffix("_m") for name in table} == {
         "timing"
     }
+
+
+@pytest.mark.parametrize("settings", [Control, Guard, Robustness, Physics, Tolerances, View])
+def test_an_empty_table_is_the_default_of_the_code(settings):
+    assert read_as(settings, {}) == settings()
+
+
+def refused(make, **values):
+    try:
+        make(**values)
+    except ValueError:
+        return True
+    return False
+
+
+@pytest.mark.parametrize("settings", [Control, Guard, Physics, Tolerances])
+def test_tables_and_code_refuse_the_same_numbers(settings):
+    answers = set()
+    for field in fields(settings):
+        if not isinstance(field.default, float):
+            continue
+        key = (said(hints(settings)[field.name], Key) or Key(field.name)).name
+        for value in (-1.0, 0.0, 0.5, 1.0, 2.0, math.nan):
+            by_code = refused(settings, **{field.name: value})
+            assert refused(table_of(settings), **{key: value}) == by_code, (key, value)
+            answers.add(by_code)
+    assert answers == {True, False}
 
 
 # --- whatever stands in a file ---

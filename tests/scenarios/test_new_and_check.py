@@ -33,7 +33,9 @@ def test_a_file_that_is_written_says_what_the_other_says(file):
 def test_new_writes_a_file_that_explains_every_key_and_never_overwrites(folder, capsys):
     assert ended("new mine", capsys)[0] == 0
     text = (folder / "mine.toml").read_text()
-    assert text.startswith(f"#:schema {SCHEMA.as_uri()}\n")
+    assert text.startswith(f"#:schema {SCHEMA.name}\n")
+    assert (folder / SCHEMA.name).read_text() == SCHEMA.read_text()
+    assert str(SCHEMA.parent) not in text and "file:" not in text
     assert replace(scenario("mine.toml"), name="template") == read(TEMPLATE)
     for key in ("density_kg_per_m3", "friction_factor", "timestep_s", "slip_mm", "eye_m"):
         before = text.partition(f"#{key} = ")[0].splitlines()[-1]
@@ -41,6 +43,13 @@ def test_new_writes_a_file_that_explains_every_key_and_never_overwrites(folder, 
     code, _, errors = ended("new mine --from cylinder-tilt", capsys)
     assert (code, (folder / "mine.toml").read_text()) == (2, text)
     assert "exists" in errors
+
+
+def test_new_brings_the_schema_up_to_date_and_leaves_another_file_of_its_name(folder, capsys):
+    for text, left in (('{"title": "fulcrum scenario"}', False), ('{"title": "mine"}', True)):
+        (folder / SCHEMA.name).write_text(text)
+        assert ended(f"new mine{left}", capsys)[0] == 0
+        assert ((folder / SCHEMA.name).read_text() == text) == left
 
 
 def test_new_from_another_scenario_is_that_scenario(folder, capsys):

@@ -210,6 +210,29 @@ def test_a_mesh_beside_the_file_is_read_and_one_elsewhere_where_it_is_allowed(fo
     assert (code, "tilt: got 100" in errors) == (2, True)
 
 
+def test_an_edge_of_a_shape_without_corners_is_told_to_use_points(folder):
+    changes = [
+        (
+            'shape = "box"\nsize_m = [0.3, 0.2, 0.1]',
+            'shape = "cylinder"\nradius_m = 0.1\nlength_m = 0.1',
+        ),
+        ('face = "+y"\nat = [0.5, 0.75]\nmay_touch = ["+y"]', "point_m = [0, 0.1, 0]"),
+        ('face = "-y"\nat = [0.5, 0.75]\nmay_touch = ["-y"]', "point_m = [0, -0.1, 0]"),
+        ('corner = "-x +y -z"', "point_m = [0, 0.1, -0.05]"),
+        ('corner = "-x -y -z"', "point_m = [0, -0.1, -0.05]"),
+    ]
+    with pytest.raises(FileError, match=r"path\.edge: .* point_m and axis, as only a box has"):
+        said(folder, *changes)
+
+
+def test_a_byte_order_mark_is_no_part_of_the_file(folder):
+    (folder / "marked.toml").write_text(GOOD, encoding="utf-8-sig")
+    assert replace(read(folder / "marked.toml"), name="good") == read(folder / "good.toml")
+    (folder / "marked.toml").write_text(GOOD.replace("angle_deg", "angel"), encoding="utf-8-sig")
+    with pytest.raises(FileError, match=r"marked\.toml:\d+: path\.angel"):
+        read(folder / "marked.toml")
+
+
 def test_a_robot_whose_package_reaches_out_of_the_folder_is_refused(folder):
     (folder.parent / "package.xml").write_text("<package><name>mine</name></package>")
     (folder / "arm.urdf").write_text("<robot/>")

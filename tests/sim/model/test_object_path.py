@@ -168,7 +168,9 @@ def test_an_angle_that_cannot_be_followed_is_refused(angle_deg):
     ],
 )
 def test_a_path_that_is_no_number_is_refused_by_name(field, change):
-    with pytest.raises(InvalidInputError, match=rf"path\.{field}: got .*; valid is finite numbers"):
+    with pytest.raises(
+        InvalidInputError, match=rf"path\.{field}: got .*; valid is (a )?finite number"
+    ):
         ScrewPath(replace(scenario("box-tilt").path, **change))
 
 
