@@ -11,7 +11,7 @@ from fulcrum.scenarios.reading.access import Access
 from fulcrum.scenarios.reading.contacts import make_hand, make_support
 from fulcrum.scenarios.reading.object import Thing, friction, make_object, make_surface, make_thing
 from fulcrum.scenarios.reading.places import direction, only_one, orientation, vector
-from fulcrum.scenarios.reading.settings import control, phases, physics, tolerances
+from fulcrum.scenarios.reading.settings import control, disturbed, phases, physics, tolerances
 from fulcrum.scenarios.reading.source import Key, Source
 from fulcrum.scenarios.schema.motion import PosesTable, RobotTable, ScrewTable, TiltTable
 from fulcrum.scenarios.schema.tables import ScenarioFile
@@ -51,6 +51,7 @@ def build(source: Source, file: ScenarioFile, access: Access) -> Scenario:
             control=control(file.control),
             physics=physics(file.physics),
             tolerances=tolerances(file.tolerances),
+            disturbed=disturbed(file.tolerances.disturbed),
             view=View(vector(file.view.eye_m), vector(file.view.target_m)),
         )
 

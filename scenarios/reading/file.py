@@ -6,6 +6,7 @@ allows it.
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 from pathlib import Path
 from typing import Any, TypeVar
@@ -142,5 +143,12 @@ def schema() -> dict[str, Any]:
     return {
         "$schema": "https://json-schema.org/draft/2020-12/schema",
         "title": "fulcrum scenario",
-        **made,
+        **_named_infinities(made),
     }
+
+
+def _named_infinities(value: Any) -> Any:
+    """The value with infinite defaults, which JSON does not know, as TOML spells them."""
+    if isinstance(value, dict):
+        return {key: _named_infinities(item) for key, item in value.items()}
+    return "inf" if value == math.inf else value

@@ -8,6 +8,7 @@ from fulcrum.scenarios.reading.places import vector
 from fulcrum.scenarios.reading.source import Source
 from fulcrum.scenarios.schema.settings import (
     ControlTable,
+    DisturbedTable,
     ManoeuvreTable,
     PhysicsTable,
     RobustnessTable,
@@ -101,4 +102,9 @@ def physics(table: PhysicsTable) -> Physics:
 
 def tolerances(table: TolerancesTable) -> Tolerances:
     """What counts as success."""
+    return Tolerances(**table.model_dump(exclude={"disturbed"}))
+
+
+def disturbed(table: DisturbedTable) -> Tolerances:
+    """What counts as success in a world that is not as believed."""
     return Tolerances(**table.model_dump())

@@ -10,7 +10,7 @@ from pydantic import Field
 from fulcrum.scenarios.schema.keys import NotNegative, Number, Positive, Table, Text, Vector3
 from fulcrum.sim.scenario.control import Control, Guard
 from fulcrum.sim.scenario.phases import REACH, STANDOFF
-from fulcrum.sim.scenario.physics import Physics, Tolerances
+from fulcrum.sim.scenario.physics import DISTURBED, Physics, Tolerances
 from fulcrum.sim.scenario.scenario import View
 from fulcrum.synthesis import Objective
 
@@ -19,6 +19,9 @@ Seconds = Annotated[Number, Gt(0.0), Le(600.0)]
 Share = Annotated[Number, Field(ge=0.0, le=1.0)]
 Fraction = Annotated[Number, Field(ge=0.0, lt=1.0)]
 Spread3 = Annotated[list[NotNegative], Len(3, 3)]
+# An infinite one is none.
+Limit = Annotated[float, Field(strict=True, gt=0.0, allow_inf_nan=True)]
+LimitOrZero = Annotated[float, Field(strict=True, ge=0.0, allow_inf_nan=True)]
 Count = Annotated[int, Field(strict=True, ge=1)]
 
 
@@ -196,29 +199,99 @@ class PhysicsTable(Table):
     """Time constant [s] and damping ratio [-] of the friction directions."""
 
 
-class TolerancesTable(Table):
-    """What counts as success."""
+class DisturbedTable(Table):
+    """What counts as success in a world that is not as believed; inf is not judged."""
 
-    final_deg: Positive = Tolerances.final_deg
+    final_deg: Limit = DISTURBED.final_deg
     """Deviation of the final tilt [deg]."""
 
-    error_deg: Positive = Tolerances.error_deg
+    error_deg: Limit = DISTURBED.error_deg
     """Tilt error at any time [deg]."""
 
-    slip_mm: Positive = Tolerances.slip_mm
-    """Drift of the touching points, and how far they slide [mm]."""
+    slip_mm: Limit = DISTURBED.slip_mm
+    """Drift of the points that touch, of hands and supports [mm]."""
 
-    spin_deg: Positive = Tolerances.spin_deg
+    support_slip_mm: Limit | None = DISTURBED.support_slip_mm
+    """Drift at supports [mm]; slip_mm, if it is left out."""
+
+    slide_mm: Limit | None = DISTURBED.slide_mm
+    """How far contacts slide in all [mm]; slip_mm, if it is left out."""
+
+    spin_deg: Limit = DISTURBED.spin_deg
     """Turn about the contact normal [deg]."""
 
-    utilisation: Positive = Tolerances.utilisation
+    utilisation: Limit = DISTURBED.utilisation
     """Friction utilisation in the plant [-]."""
 
-    force_error: Positive = Tolerances.force_error
+    force_error: Limit = DISTURBED.force_error
     """RMS of measured minus commanded normal force, over the peak commanded one [-]."""
 
-    saturated_s: NotNegative = Tolerances.saturated_s
+    saturated_s: LimitOrZero = DISTURBED.saturated_s
     """How long a torque may be cut at its limit at a stretch [s]."""
+
+    support_lost_s: LimitOrZero = DISTURBED.support_lost_s
+    """How long a support may lose touch at a stretch [s]."""
+
+    impact: Limit = DISTURBED.impact
+    """Force of a hand that comes or goes, over its largest grip [-]."""
+
+    collisions: bool = DISTURBED.collisions
+    """Whether contacts that are not wanted count."""
+
+    no_forces: bool = DISTURBED.no_forces
+    """Whether it counts if the synthesis finds no forces."""
+
+    given_up: bool = DISTURBED.given_up
+    """Whether it counts if the guard lowers the object or stops the run."""
+
+
+class TolerancesTable(Table):
+    """What counts as success; inf is not judged."""
+
+    final_deg: Limit = Tolerances.final_deg
+    """Deviation of the final tilt [deg]."""
+
+    error_deg: Limit = Tolerances.error_deg
+    """Tilt error at any time [deg]."""
+
+    slip_mm: Limit = Tolerances.slip_mm
+    """Drift of the points that touch, of hands and supports [mm]."""
+
+    support_slip_mm: Limit | None = Tolerances.support_slip_mm
+    """Drift at supports [mm]; slip_mm, if it is left out."""
+
+    slide_mm: Limit | None = Tolerances.slide_mm
+    """How far contacts slide in all [mm]; slip_mm, if it is left out."""
+
+    spin_deg: Limit = Tolerances.spin_deg
+    """Turn about the contact normal [deg]."""
+
+    utilisation: Limit = Tolerances.utilisation
+    """Friction utilisation in the plant [-]."""
+
+    force_error: Limit = Tolerances.force_error
+    """RMS of measured minus commanded normal force, over the peak commanded one [-]."""
+
+    saturated_s: LimitOrZero = Tolerances.saturated_s
+    """How long a torque may be cut at its limit at a stretch [s]."""
+
+    support_lost_s: LimitOrZero = Tolerances.support_lost_s
+    """How long a support may lose touch at a stretch [s]."""
+
+    impact: Limit = Tolerances.impact
+    """Force of a hand that comes or goes, over its largest grip [-]."""
+
+    collisions: bool = Tolerances.collisions
+    """Whether contacts that are not wanted count."""
+
+    no_forces: bool = Tolerances.no_forces
+    """Whether it counts if the synthesis finds no forces."""
+
+    given_up: bool = Tolerances.given_up
+    """Whether it counts if the guard lowers the object or stops the run."""
+
+    disturbed: DisturbedTable = DisturbedTable()
+    """The same for runs with --preset or --world, and for sweeps."""
 
 
 class ViewTable(Table):

@@ -203,16 +203,15 @@ class Controller:
         """Follows the rest of a planned tilt in another timing, where that is due."""
         anew = None
         if self._supervisor.mode is Mode.RUN and before is Mode.HOLD:
-            anew, why = replanner.rested(target), "the run goes on"
+            anew = replanner.rested(target)
         elif self._supervisor.mode is Mode.RUN:
-            anew, why = replanner.caught(target, seen), "the arms have fallen behind"
+            anew = replanner.caught(target, seen)
         if anew is None:
             return
         self._references = References(anew.joint_path, self._timestep)
         self._total_s = anew.joint_path.schedule.total_s
         self._clock.set(seen.t, anew.path_t)
         self._drives.forget(anew.path_t)
-        self._supervisor.note(seen.t, why, "plan anew")
 
     def _synthesize(self, seen: Measurement, target: Target) -> Solution | BestEffort | None:
         """Sends the forces for a measured pose, if there are any."""

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, fields
 
 from fulcrum.synthesis import InvalidInputError
-from fulcrum.synthesis.checks import length, not_negative, positive, whole
+from fulcrum.synthesis.checks import length, positive, whole
 
 # A run's steps are to be counted, and kept [s].
 _SHORTEST_STEP_S = 1e-5
@@ -58,29 +59,76 @@ class Physics:
 
 @dataclass(frozen=True)
 class Tolerances:
-    """What counts as success.
+    """What counts as success. Infinity, or False, means that something is not judged.
 
     Attributes:
         final_deg: Deviation of the final tilt [deg].
         error_deg: Tilt error at any time [deg].
-        slip_mm: Drift of the touching material points, and the integral of tangential speed [mm].
+        slip_mm: Drift of the material points that touch [mm]; hands may never let go.
+        support_slip_mm: The same of supports [mm]; as slip_mm if None.
+        slide_mm: Integral of the tangential speed at a contact [mm]; as slip_mm if None.
         spin_deg: Turn about the contact normal [deg].
         utilisation: Friction utilisation in the plant [-]; not of supports that hold the same
             point, which share it as they happen to.
         force_error: RMS of measured minus commanded normal force over the peak commanded one [-];
             of supports that hold the same point that of their force together.
         saturated_s: How long a torque may be cut at its limit at a stretch [s].
+        support_lost_s: How long a support may lose touch at a stretch [s].
+        impact: Normal force of a hand while no grip is asked for, over its largest grip [-].
+        collisions: Whether contacts that the scenario does not want are failures: of geoms that
+            must keep clear, and of hands with an object that is to stand alone.
+        no_forces: Whether a synthesis that finds no forces is a failure.
+        given_up: Whether it is a failure that the guard lowers the object, or stops the run.
     """
 
     final_deg: float = 0.1
     error_deg: float = 0.2
     slip_mm: float = 0.1
+    support_slip_mm: float | None = None
+    slide_mm: float | None = None
     spin_deg: float = 0.1
     utilisation: float = 0.95
     force_error: float = 0.02
     saturated_s: float = 0.0
+    support_lost_s: float = 0.0
+    impact: float = 1.0
+    collisions: bool = True
+    no_forces: bool = True
+    given_up: bool = True
 
     def __post_init__(self) -> None:
         for field in fields(self):
-            check = not_negative if field.name == "saturated_s" else positive
-            check(f"tolerances.{field.name}", getattr(self, field.name))
+            value = getattr(self, field.name)
+            if value is None or isinstance(value, bool):
+                continue
+            check = _not_below if field.name.endswith("_s") else _above
+            check(f"tolerances.{field.name}", value)
+
+
+def _above(field: str, value: float) -> None:
+    if not value > 0.0:
+        raise InvalidInputError(field, value, "a number > 0; inf if it is not to be judged")
+
+
+def _not_below(field: str, value: float) -> None:
+    if not value >= 0.0:
+        raise InvalidInputError(field, value, "a number >= 0; inf if it is not to be judged")
+
+
+# A disturbed run is judged by what it achieves, and by what its hands and motors bear on the way.
+DISTURBED = Tolerances(
+    final_deg=2.0,
+    error_deg=math.inf,
+    slip_mm=5.0,
+    support_slip_mm=3.0,
+    slide_mm=math.inf,
+    spin_deg=math.inf,
+    utilisation=math.inf,
+    force_error=math.inf,
+    saturated_s=0.05,
+    support_lost_s=math.inf,
+    impact=math.inf,
+    collisions=False,
+    no_forces=False,
+    given_up=False,
+)

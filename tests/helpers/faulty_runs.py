@@ -143,7 +143,9 @@ def faulty_run(name, guarded=True):
     control = scene.control if guarded else replace(scene.control, guard=UNGUARDED)
     out = Path(tempfile.mkdtemp()) / "run" if guarded else None
     anyway = scene is TOO_FAR
-    request = Request(scene, "margin", control, world=world, out=out, anyway=anyway)
+    request = Request(
+        scene, "margin", control, world=world, out=out, anyway=anyway, disturbed=False
+    )
     return Faulty(execute(request), None if out is None else out / "run.rrd")
 
 

@@ -1,5 +1,6 @@
 """Every setting of a scenario has its key in the file, and no text is read without an answer."""
 
+import math
 import random
 import re
 import tomllib
@@ -8,10 +9,11 @@ from dataclasses import fields
 import pytest
 
 from fulcrum.scenarios.reading.file import made, read, scene_files
-from fulcrum.scenarios.reading.settings import control, phases, physics, tolerances
+from fulcrum.scenarios.reading.settings import control, disturbed, phases, physics, tolerances
 from fulcrum.scenarios.reading.source import FileError, Source
 from fulcrum.scenarios.schema.settings import (
     ControlTable,
+    DisturbedTable,
     GuardTable,
     ManoeuvreTable,
     PhysicsTable,
@@ -21,7 +23,7 @@ from fulcrum.scenarios.schema.settings import (
 from fulcrum.scenarios.schema.writer import write
 from fulcrum.sim.scenario.control import Control, Guard, Robustness
 from fulcrum.sim.scenario.phases import Phase
-from fulcrum.sim.scenario.physics import Physics, Tolerances
+from fulcrum.sim.scenario.physics import DISTURBED, Physics, Tolerances
 from fulcrum.synthesis import FulcrumError, Objective
 from fulcrum.synthesis.robust.uncertainty_set import UncertaintySet
 from tests.helpers.broken_files import GOOD
@@ -33,6 +35,8 @@ def other(value):
         return not value
     if isinstance(value, Objective):
         return Objective.MAX_TORQUE
+    if value is None:
+        return 0.125
     if isinstance(value, list):
         return [other(item) for item in value]
     return value + 1 if isinstance(value, int) else 0.5 * value or 0.125
@@ -58,7 +62,11 @@ def test_every_setting_has_its_key():
     assert same(own.robustness, Robustness(UncertaintySet(), preload=0.0)) == set()
     assert same(own.robustness.uncertainty, UncertaintySet()) == set()
     assert same(physics(changed(PhysicsTable())), Physics()) == set()
-    assert same(tolerances(changed(TolerancesTable())), Tolerances()) == set()
+    own = changed(TolerancesTable(), disturbed=DisturbedTable())
+    assert same(tolerances(own), Tolerances()) == set()
+    finite = DisturbedTable(**{n: 0.25 for n, v in vars(DISTURBED).items() if v == math.inf})
+    assert same(disturbed(changed(finite)), DISTURBED) == set()
+    assert disturbed(DisturbedTable()) == DISTURBED
 
 
 def test_a_setting_without_a_key_is_noticed():

@@ -5,10 +5,10 @@ from dataclasses import fields, replace
 
 import numpy as np
 import pytest
+from fulcrum.sim.sweep.criteria import Criteria, violations
 
 from fulcrum.sim.model.robot import RobotModel
 from fulcrum.sim.signals.trace import stretches
-from fulcrum.sim.sweep.criteria import Criteria, violations
 from fulcrum.synthesis import InvalidInputError
 from tests.helpers.short_run import (
     EDGE_LEFT,
