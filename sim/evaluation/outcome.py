@@ -68,6 +68,8 @@ def measured_outcome(scenario: Scenario, trace: Trace) -> Outcome:
     if _speeds(thing, trace.quat_WO[-1:], mean[None])[0] > _REST:
         return Outcome.DROPPED
     tilt = float(trace.tilt[-1])
+    if not math.isfinite(tilt):
+        return Outcome.DROPPED
     target = math.radians(scenario.path.angle_deg) * scenario.phases[-1].tilt
     near = math.degrees(abs(tilt - target)) <= scenario.disturbed.final_deg
     # Near the path's ends the measured tilt may lie beyond.

@@ -27,8 +27,8 @@ from tests.helpers.short_run import (
 )
 
 REPORT_KEYS = {
-    "": "scenario controller objective seed disturbed verdict outcome failures events phases tilt contacts torque"
-    " synthesis timing recording",
+    "": "scenario controller objective seed disturbed verdict outcome failures events phases tilt"
+    " contacts torque synthesis timing recording",
     "tilt": "target_deg final_deg rms_error_deg max_error_deg",
     "contacts": "left right edge_left edge_right",
     "contacts.left": "kept_fraction slip_mm slide_mm spin_deg max_utilisation max_normal_n"

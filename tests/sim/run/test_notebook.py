@@ -154,9 +154,8 @@ def test_a_run_shows_verdict_contacts_and_units():
 
 def test_a_run_that_went_wrong_shows_why():
     result = short_run()
-    failed = replace(
-        result.report, failures=(Failure(1.0, Category.LOST, "<left>", "The <left> let go."),)
-    )
+    failure = Failure(1.0, Category.LOST, "<left>", "The <left> let go.")
+    failed = replace(result.report, failures=(failure,))
     text = shown(Result(failed, result.trace, result.history, "It diverged."))
     assert "- The &lt;left&gt; let go." in text
     assert "Ended by: It diverged." in text

@@ -186,9 +186,8 @@ def test_a_diverged_run_keeps_every_step_before_and_says_when(monkeypatch, tmp_p
     assert report.verdict is Verdict.FAIL
     # It stands before the tilt that was not reached because of it.
     (error,) = [failure for failure in report.failures if failure.category == "error"]
-    assert {
-        failure.category for failure in report.failures[report.failures.index(error) + 1 :]
-    } <= {"tilt"}
+    later = report.failures[report.failures.index(error) + 1 :]
+    assert {failure.category for failure in later} <= {"tilt"}
     assert report.outcome is Outcome.DIVERGED
     assert error.text == (
         f"the simulation diverged at {1e-3 * step:.3f} s; check the scenario's physics."
