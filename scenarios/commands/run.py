@@ -99,7 +99,8 @@ class Run(Chosen):
         from fulcrum.sim.motion.joint_path import PathError
 
         told = super().told(error)
-        return f"refused: {told}" if isinstance(error, PathError) else told
+        refused = isinstance(error, PathError)
+        return f"{told.rstrip('.')}. Refused: nothing has moved." if refused else told
 
     def _request(self) -> tuple[Request, Preparation | None]:
         """What to run, and what is prepared of it: a planned tilt, if there is to be one."""
