@@ -14,7 +14,8 @@ from typing import TYPE_CHECKING
 from fulcrum.scenarios import scenario as named_scenario
 from fulcrum.scenarios.commands.common import asked_planning, one_of
 from fulcrum.sim.analysis import capacity as capacity_analysis
-from fulcrum.sim.analysis import explain as explanation
+from fulcrum.sim.analysis import explain as analysis
+from fulcrum.sim.analysis.explanation import Explanation
 from fulcrum.sim.analysis.feasibility import Feasibility, feasibility
 from fulcrum.sim.placement.freedom import Freedom
 from fulcrum.sim.placement.search import Effort, Placement, search
@@ -35,7 +36,7 @@ from fulcrum.sim.scenario.control import (
 from fulcrum.sim.scenario.control import controller as named_controller
 from fulcrum.sim.scenario.scenario import Scenario
 from fulcrum.sim.sweep.design import Sweep
-from fulcrum.sim.sweep.farm import Outcome, run_sweep
+from fulcrum.sim.sweep.farm import SweepResult, run_sweep
 from fulcrum.sim.world import presets
 from fulcrum.sim.world.parameters import ParameterGrid, overridden, parameter_name
 from fulcrum.synthesis import Synthesizer
@@ -113,7 +114,7 @@ def sweep(
     grid: ParameterGrid = (),
     out: Path | None = None,
     workers: Workers = LOCAL,
-) -> Outcome:
+) -> SweepResult:
     """Run controllers in many drawn worlds; return one row per episode, and success rates.
 
     Args:
@@ -164,7 +165,7 @@ def check(scenario: Asked, controller: str = "robust") -> Feasibility:
 
 def explain(
     scenario: Asked, tilt_deg: float | None = None, controller: str = "margin"
-) -> explanation.Explanation:
+) -> Explanation:
     """Explain why no forces exist and what would help, or the margins of those that do.
 
     Args:
@@ -179,8 +180,8 @@ def explain(
     scene = _scene(scenario)
     problems, synthesizer = PathProblems(scene, _control(scene, controller)), Synthesizer()
     if tilt_deg is None:
-        tilt_deg = explanation.tightest_tilt(problems, synthesizer)
-    return explanation.explain(problems, tilt_deg, synthesizer)
+        tilt_deg = analysis.tightest_tilt(problems, synthesizer)
+    return analysis.explain(problems, tilt_deg, synthesizer)
 
 
 def capacity(scenario: Asked, controller: str = "margin") -> tuple[capacity_analysis.Capacity, ...]:

@@ -12,6 +12,8 @@ import numpy as np
 from fulcrum.synthesis.arrays import Array
 from fulcrum.synthesis.contact import Contact, ContactModel, ContactSet, check_names, grasp_maps
 from fulcrum.synthesis.errors import InvalidInputError
+from fulcrum.synthesis.markdown import number, numbers
+from fulcrum.synthesis.render import Marked, Page, page, table, to_markdown
 
 # Rotation matrices come from integrated quaternions: 1e-6 passes those, and nothing mis-scaled.
 _ROTATION_TOLERANCE = 1e-6
@@ -241,10 +243,36 @@ class Problem:
         J = self.joints.J_C.reshape(-1, len(self.joints.names))
         return w_OC_C[self.contact_set.hand_rows].ravel().dot(J) + self.joints.tau_g
 
-    def _repr_markdown_(self) -> str:
-        from fulcrum.synthesis.notebook import problem_markdown
+    def page(self) -> Page:
+        """Return contacts, external wrench and joints as a page."""
+        rows = []
+        for contact, p in zip(self.contacts, self.p_OC_O, strict=True):
+            rough = contact.model is not ContactModel.FRICTIONLESS
+            rows.append(
+                (
+                    contact.name,
+                    contact.role,
+                    contact.model,
+                    number(contact.mu) if rough else "",
+                    number(contact.e_n) if contact.model is ContactModel.SFCE else "",
+                    f"{number(contact.f_n_min)} to {number(contact.f_n_max)}",
+                    numbers(p, 3),
+                )
+            )
+        head = ("contact", "role", "model", "μ", "e_n [m]", "f_n [N]", "place on the object [m]")
+        force, moment = map(numbers, np.split(self.w_ext_O, 2))
+        joints = self.joints
+        return page(
+            (Marked("Problem (17)"), f": minimise {self.objective}"),
+            table(head, rows),
+            f"External force ({force}) N, moment ({moment}) N·m, in the object's axes.",
+            "No joints: torques are not limited."
+            if joints is None
+            else f"{len(joints.names)} joints: {', '.join(joints.names)}.",
+        )
 
-        return problem_markdown(self)
+    def _repr_markdown_(self) -> str:
+        return to_markdown(self.page())
 
 
 def _check_shape(name: str, array: Array, shape: tuple[int, ...]) -> None:

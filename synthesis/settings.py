@@ -63,6 +63,10 @@ class OrInfinite:
     """Marks a number that may be infinite in code; files have finite numbers only."""
 
 
+class Unlimited:
+    """Marks a number that is infinite where there is no limit, in code and in files."""
+
+
 class Settings:
     """Base of settings classes: checks every field by its annotation when an instance is made."""
 
@@ -129,7 +133,7 @@ def _check_number(field: str, kind: type, rules: tuple[Any, ...], value: Any) ->
     ]
     if kind is int:
         good, what = isinstance(value, int) and not isinstance(value, bool), "an integer"
-    elif OrInfinite in rules:
+    elif OrInfinite in rules or Unlimited in rules:
         good, what = not math.isnan(value), "a number"
     else:
         good, what = math.isfinite(value), "a finite number"

@@ -19,10 +19,16 @@ from functools import cached_property
 
 import numpy as np
 
-from fulcrum.synthesis.arrays import Array, N
+from fulcrum.synthesis.arrays import M_N, Array, N, O, T
 from fulcrum.synthesis.contact import ContactModel, utilisation
 from fulcrum.synthesis.errors import FulcrumError
+from fulcrum.synthesis.markdown import number
 from fulcrum.synthesis.problem import Objective, Problem
+from fulcrum.synthesis.render import Marked, Page, page, table, to_markdown
+
+# How many joints and constraints a table names.
+_NAMED = 6
+_UNITS = {"normal-force": "N", "torque": "N·m"}
 
 
 @dataclass(frozen=True, eq=False)
@@ -213,10 +219,40 @@ class Solution:
             return abs(dual)
         return abs(self.value - dual)
 
-    def _repr_markdown_(self) -> str:
-        from fulcrum.synthesis.notebook import solution_markdown
+    def page(self) -> Page:
+        """Return objective, forces, joints nearest to their limits and the proof as a page."""
+        problem, found = self.problem, self.residuals
+        rows = []
+        for contact, w, used in zip(problem.contacts, self.w_OC_C, self.utilisation, strict=True):
+            soft = contact.model is ContactModel.SFCE
+            forces = (f"{w[k]:z.3f}" for k in (N, T, O))
+            rows.append(
+                (contact.name, *forces, f"{w[M_N]:z.4f}" if soft else "", f"{100.0 * used:.1f}")
+            )
+        head = ("contact", "f_n [N]", "f_t [N]", "f_o [N]", "m_n [N·m]", "friction used [%]")
+        objective = problem.objective
+        unit = next((f" {u}" for end, u in _UNITS.items() if objective.endswith(end)), "")
+        return page(
+            (Marked("Solution"), f": {objective} {number(self.value, 5)}{unit}"),
+            table(head, rows),
+            table(("joint", "torque [N·m or N]", "limit used [%]"), self._joint_rows()),
+            f"Violation {found.primal:.0e}, stationarity {found.dual:.0e}, gap {found.gap:.0e}; "
+            f"{self.iterations} iterations, {1e3 * self.solve_s:.2f} ms.",
+        )
 
-        return solution_markdown(self)
+    def _joint_rows(self) -> list[tuple[str, str, str]]:
+        """The joints that use most of their torque limits."""
+        joints, tau = self.problem.joints, self.tau
+        if joints is None:
+            return []
+        limits = np.where(tau < 0.0, joints.tau_min, joints.tau_max)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            shares = np.nan_to_num(tau / limits, nan=0.0)
+        order = np.argsort(-shares, kind="stable")[:_NAMED]
+        return [(joints.names[k], f"{tau[k]:z.3f}", f"{100 * shares[k]:.1f}") for k in order]
+
+    def _repr_markdown_(self) -> str:
+        return to_markdown(self.page())
 
 
 @dataclass(frozen=True, eq=False)
@@ -257,10 +293,21 @@ class Certificate:
         weights = self.multipliers.weights(self.problem)
         return sorted((n for n in weights if weights[n] > 0.0), key=lambda n: -weights[n])[:count]
 
-    def _repr_markdown_(self) -> str:
-        from fulcrum.synthesis.notebook import certificate_markdown
+    def page(self) -> Page:
+        """Return the constraints that contradict each other, heaviest first, as a page."""
+        weights = self.multipliers.weights(self.problem)
+        rows = [(name, number(weights[name])) for name in self.heaviest(_NAMED)]
+        return page(
+            (
+                Marked("No forces exist"),
+                ": these constraints contradict each other (Farkas certificate, value "
+                f"{number(self.value)}, residual {self.residual:.0e})",
+            ),
+            table(("constraint", "multiplier [1/N or 1/(N·m)]"), rows),
+        )
 
-        return certificate_markdown(self)
+    def _repr_markdown_(self) -> str:
+        return to_markdown(self.page())
 
 
 def certificate(problem: Problem, ray: Multipliers) -> Certificate:

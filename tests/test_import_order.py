@@ -16,24 +16,6 @@ ORDER = (
     {"run"},
     {"sweep", "placement"},
 )
-# Imports, by module, that are still to be mended; other tests leave them out.
-PENDING = {
-    ("sim.evaluation.report", "sim.run.notebook"),
-    ("sim.planning.plan", "sim.run.notebook"),
-    ("sim.run.notebook", "sim.sweep.farm"),
-    ("sim.run.execute", "sim.run.notebook"),
-    ("sim.scenario.scenario", "sim.run.notebook"),
-    ("synthesis.problem", "synthesis.notebook"),
-    ("synthesis.solution", "synthesis.notebook"),
-}
-
-
-def without(graph, edges):
-    """The graph without edges to those modules; their packages go with them."""
-    gone = {}
-    for module, target in edges:
-        gone.setdefault(module, set()).update({target, target.rpartition(".")[0]})
-    return {module: found - gone.get(module, set()) for module, found in graph.items()}
 
 
 def against_the_order(graph):
@@ -61,21 +43,13 @@ def test_the_order_names_all_packages_of_sim():
 
 
 def test_imports_inside_sim_go_down():
-    assert against_the_order(module_graph(sources())) <= PENDING
+    assert against_the_order(module_graph(sources())) == set()
 
 
 def test_no_modules_and_no_packages_import_in_a_circle():
-    graph = without(module_graph(sources()), PENDING)
+    graph = module_graph(sources())
     assert circles(graph) == []
     assert circles(package_graph(graph)) == []
-
-
-@pytest.mark.parametrize("edge", sorted(PENDING))
-def test_what_is_pending_is_still_wrong(edge):
-    graph = module_graph(sources())
-    rest = without(graph, PENDING - {edge})
-    wrong = edge in against_the_order(graph) or any(edge[0] in group for group in circles(rest))
-    assert wrong and edge[1] in graph.get(edge[0], ())
 
 
 HOUSE = {

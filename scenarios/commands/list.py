@@ -7,6 +7,8 @@ from dataclasses import dataclass
 from fulcrum.scenarios.commands.common import (
     PASSED,
 )
+from fulcrum.scenarios.commands.terminal import show
+from fulcrum.synthesis.render import Lines, page, table
 
 
 @dataclass(frozen=True)
@@ -15,18 +17,14 @@ class ListCommand:
 
     def execute(self) -> int:
         """Does it; returns the exit code."""
-        from rich.console import Console
-        from rich.table import Table
-
         from fulcrum.scenarios.reading.library import scenarios
         from fulcrum.sim.scenario.control import Control, controllers
         from fulcrum.synthesis.problem import Objective
 
-        table = Table("scenario", "what happens")
-        for scenario in scenarios().values():
-            table.add_row(scenario.name, scenario.summary)
-        console = Console()
-        console.print(table)
-        console.print(f"controllers: {', '.join(controllers(Control()))}")
-        console.print(f"objectives:  {', '.join(Objective)}")
+        rows = [(scenario.name, scenario.summary) for scenario in scenarios().values()]
+        names = (
+            f"controllers: {', '.join(controllers(Control()))}",
+            f"objectives:  {', '.join(Objective)}",
+        )
+        show(page(table(("scenario", "what happens"), rows), Lines(names)))
         return PASSED

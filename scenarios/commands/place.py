@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import shlex
 from dataclasses import dataclass
 from pathlib import Path
@@ -18,19 +17,15 @@ from fulcrum.scenarios.commands.common import (
     one_of,
     progress_bar,
 )
+from fulcrum.scenarios.commands.terminal import show
+from fulcrum.synthesis.render import page
 
 if TYPE_CHECKING:
-    from rich.console import Console
-
     from fulcrum.scenarios.reading.source import Source
     from fulcrum.sim.placement.freedom import Freedom
-    from fulcrum.sim.placement.search import Placement
-    from fulcrum.sim.placement.value import Value
     from fulcrum.sim.scenario.scenario import Scenario
 
 Kept = Literal["base", "hands", "turn", "posture"]
-# Changes of angles below this are not listed [deg].
-_LISTED_DEG = 1.0
 # Share of the time for the search; start, file and picture take the rest [-].
 _SEARCHED = 0.9
 
@@ -78,11 +73,11 @@ class PlaceCommand(Chosen):
 
     def execute(self) -> int:
         """Does it; returns the exit code: 1 if nothing better was found."""
-        from rich.console import Console
 
         from fulcrum.scenarios.reading.file import bring_schema, made
         from fulcrum.scenarios.reading.placed import placed
         from fulcrum.scenarios.reading.source import Source
+        from fulcrum.sim.placement.page import placement_page
         from fulcrum.sim.placement.picture import draw
         from fulcrum.sim.placement.search import Effort, search
         from fulcrum.sim.placement.value import Goal
@@ -95,8 +90,7 @@ class PlaceCommand(Chosen):
         freedom = self._freedom(scenario, source)
         with progress_bar(f"{scenario.name}, {goal}") as move:
             found = search(scenario, self.controller, goal, freedom, effort, move)
-        console = Console(highlight=False)
-        _print(console, scenario, found)
+        show(placement_page(scenario, found))
         if not found.improved:
             return FAILED
         elsewhere = out.absolute().parent != source.file.absolute().parent
@@ -108,7 +102,7 @@ class PlaceCommand(Chosen):
         out.write_text(text, encoding="utf-8")
         picture = out.with_suffix(".png")
         draw(scenario, found, control, picture)
-        console.print(f"{out}; picture: {picture}", soft_wrap=True, markup=False)
+        show(page(f"{out}; picture: {picture}"))
         return PASSED
 
     def _words(self) -> list[str]:
@@ -176,78 +170,3 @@ class PlaceCommand(Chosen):
             turn_deg=still if "turn" in self.keep else whole.turn_deg,
             posture_deg=still if "posture" in self.keep else whole.posture_deg,
         )
-
-
-def _print(console: Console, scenario: Scenario, found: Placement) -> None:
-    from rich.box import SIMPLE
-    from rich.markup import escape
-    from rich.table import Table
-
-    verdict = "[bold green]BETTER[/]" if found.improved else "[bold red]NOTHING BETTER[/]"
-    done = found.history[-1][0]
-    end = "" if found.in_time else ", where the time ended"
-    console.print(
-        f"{escape(scenario.name)}, goal {found.goal}: {verdict} after {done} placements, "
-        f"{found.seconds:.0f} s{end}"
-    )
-    table = Table("over the path", "before", "after", box=SIMPLE)
-    for row in _rows(found.before, found.after):
-        table.add_row(*map(escape, row))
-    console.print(table)
-    if not found.before.feasible:
-        console.print(f"before: {found.before.reason}", soft_wrap=True, markup=False)
-    for reason in dict.fromkeys(found.refused):
-        console.print(f"better, but refused: {reason}", soft_wrap=True, markup=False)
-    if found.report is None:
-        return
-    table = Table("moved", "from", "to", box=SIMPLE)
-    for row in _moves(scenario, found.scenario):
-        table.add_row(*map(escape, row))
-    console.print(table)
-    report = found.report
-    slip = max(contact.slip_mm for contact in report.contacts.values())
-    console.print(
-        f"in closed loop: [bold green]{report.verdict.upper()}[/], tilt error at most "
-        f"{report.tilt.max_error_deg:.3f} deg, slip at most {slip:.3f} mm, torque at most "
-        f"{100 * report.torque.max_utilisation:.0f} % of its limit ({report.torque.joint})",
-        soft_wrap=True,
-    )
-
-
-def _rows(before: Value, after: Value) -> list[tuple[str, ...]]:
-    def share(value: float) -> str:
-        return f"{100.0 * value:.1f} %" if math.isfinite(value) else "-"
-
-    return [
-        ("forces", *("yes" if value.feasible else "no" for value in (before, after))),
-        ("heaviest object", *(f"{value.heaviest:.2f} N" for value in (before, after))),
-        ("friction used, at the least", *(share(value.friction) for value in (before, after))),
-        ("torque used, at the least", *(share(value.torque) for value in (before, after))),
-        ("from joint limits", *(f"{value.clearance:.3g} rad or m" for value in (before, after))),
-    ]
-
-
-def _moves(before: Scenario, after: Scenario) -> list[tuple[str, ...]]:
-    def millimetres(values: tuple[float, ...]) -> str:
-        return ", ".join(f"{1e3 * value:.1f}" for value in values) + " mm"
-
-    def direction(values: tuple[float, ...]) -> str:
-        return ", ".join(f"{value:.3f}" for value in values)
-
-    rows: list[tuple[str, ...]] = []
-    for old, new in zip(before.robots, after.robots, strict=True):
-        name = f"{new.prefix}base"
-        rows.append((name, millimetres(old.base.position), millimetres(new.base.position)))
-        turns = direction(old.base.quaternion), direction(new.base.quaternion)
-        rows.append((f"{name}, quaternion", *turns))
-    for held, moved in zip(before.hands, after.hands, strict=True):
-        rows.append((held.name, millimetres(held.p_OC_O), millimetres(moved.p_OC_O)))
-        rows.append(
-            (f"{held.name}, tangent", direction(held.tangent_O), direction(moved.tangent_O))
-        )
-    posture = after.posture
-    for joint, angle in before.posture.items():
-        if abs(math.degrees(posture[joint] - angle)) > _LISTED_DEG:
-            ends = (f"{math.degrees(q):.1f} deg" for q in (angle, posture[joint]))
-            rows.append((joint, *ends))
-    return [row for row in rows if row[1] != row[2]]

@@ -15,17 +15,13 @@ from fulcrum.scenarios.commands.common import (
     check_results_folder,
     results_folder,
 )
+from fulcrum.scenarios.commands.terminal import refuse, show
 
 if TYPE_CHECKING:
-    from rich.console import Console
-
-    from fulcrum.sim.planning.plan import Plan
     from fulcrum.sim.planning.problem import Margins
     from fulcrum.sim.scenario.scenario import Scenario
 
 PLAN, PICTURE = "plan.json", "plan.png"
-# Limits with less than this at their most used are not listed.
-_LISTED = 0.5
 
 
 @dataclass(frozen=True)
@@ -71,8 +67,6 @@ class PlanCommand(Chosen):
 
     def execute(self) -> int:
         """Does it; returns the exit code: 1 if there is no such plan."""
-        from rich.console import Console
-
         from fulcrum.sim.planning.execution import made_plan
         from fulcrum.sim.planning.file import plan_content
         from fulcrum.sim.planning.picture import draw
@@ -94,12 +88,12 @@ class PlanCommand(Chosen):
         try:
             planned = made_plan(chosen, margins, planning)
         except PlanError as error:
-            print(error)
+            refuse(f"{error}")
             return FAILED
         out = results_folder(self.out, f"{chosen.name}-plan")
         write_json(out / PLAN, plan_content(planned))
         draw(planned, out / PICTURE)
-        _print(Console(highlight=False), planned)
+        show(planned.page())
         print(f"plan: {out / PLAN}")
         return PASSED
 
@@ -118,44 +112,3 @@ class PlanCommand(Chosen):
             tip_speed=self.tip_speed,
             tip_acceleration=self.tip_acceleration,
         )
-
-
-def _print(console: Console, planned: Plan) -> None:
-    import numpy as np
-    from rich.box import SIMPLE
-    from rich.markup import escape
-    from rich.table import Table
-
-    from fulcrum.sim.planning.file import stretches
-
-    found = planned.solution
-    rate = float(np.degrees(planned.peak_rate))
-    console.print(
-        f"{planned.scenario.name}, {found.problem.objective}: "
-        f"[bold]{planned.duration:.4f} s[/] for {planned.scenario.path.angle_deg:g} deg, "
-        f"at most {rate:.1f} deg/s; solved in {1e3 * found.solve_s:.0f} ms",
-        soft_wrap=True,
-    )
-    if (loads := len(found.problem.loads)) > 1:
-        console.print(
-            f"one grip for {loads} worlds: {100 * planned.share:.0f} % of the set of controller "
-            "robust",
-            soft_wrap=True,
-        )
-    residuals = found.residuals
-    console.print(
-        f"limits and balance kept to {max(residuals.primal, 0.0):.1e}, optimal to "
-        f"{max(residuals.dual, residuals.gap):.1e}",
-        soft_wrap=True,
-    )
-    table = Table(escape("tilt [deg]"), "limits used up", box=SIMPLE)
-    for low, high, limits in stretches(planned):
-        table.add_row(f"{low:.1f} to {high:.1f}", ", ".join(limits) or "none")
-    console.print(table)
-    table = Table("limit", "used at most [%]", escape("at [deg]"), box=SIMPLE)
-    places = np.degrees(planned.tilt[found.problem.stations[:, 0]])
-    for name, share in sorted(found.shares.items(), key=lambda item: -item[1].max()):
-        if share.max() >= _LISTED:
-            worst = int(share.argmax())
-            table.add_row(name, f"{100 * share[worst]:.1f}", f"{places[worst]:.1f}")
-    console.print(table)

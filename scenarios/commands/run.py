@@ -17,9 +17,10 @@ from fulcrum.scenarios.commands.common import (
     progress_bar,
     results_folder,
 )
+from fulcrum.scenarios.commands.terminal import refuse, show
+from fulcrum.synthesis.render import page
 
 if TYPE_CHECKING:
-    from fulcrum.sim.evaluation.report import Report
     from fulcrum.sim.run.execute import Request
     from fulcrum.sim.run.preparation import Preparation
 
@@ -57,6 +58,10 @@ class RunCommand(Chosen):
     world: str = ""
     """What to set of the world that was drawn, like friction=0.8,mass=1.1 (factors)."""
 
+    disturbed: bool = False
+    """Judge by the scenario's tolerances for disturbed runs, as sweeps do, and as it is done with
+    --world and every preset but nominal."""
+
     out: Path | None = None
     """New or empty folder for the results; logs/SCENARIO-CONTROLLER-TIME if left out."""
 
@@ -68,10 +73,6 @@ class RunCommand(Chosen):
 
     def execute(self) -> int:
         """Does it; returns the exit code."""
-        from rich.console import Console
-
-        from fulcrum.scenarios.commands.explain import print_explanation
-        from fulcrum.scenarios.commands.sweep import print_outcome
         from fulcrum.sim.evaluation.report import Verdict
         from fulcrum.sim.planning.plan import PlanError
         from fulcrum.sim.run.execute import execute as run
@@ -83,19 +84,24 @@ class RunCommand(Chosen):
             with progress_bar(request.scenario.name) as progress:
                 result = run(request, progress, prepared)
         except UnholdableError as error:
-            console, controller = Console(highlight=False), self.controller or "robust"
-            print_explanation(console, error.explanation, controller)
-            print("Nothing has moved; --best-effort shows what happens.")
+            show(error.explanation.page(self.controller or "robust"))
+            refuse("--best-effort shows what happens.")
             return FAILED
         except PlanError as error:
-            print(error)
+            refuse(f"{error}")
             return FAILED
         report = result.report
-        _print_report(report, request.out)
-        if self.preset != "nominal" or self.world:
-            print_outcome(request.scenario, result)
+        show(result.page() + page(f"Recording: {request.out / (report.recording or '')}"))
         codes = {Verdict.PASS: PASSED, Verdict.FAIL: FAILED, Verdict.INTERRUPTED: INTERRUPTED}
         return codes[report.verdict]
+
+    def told(self, error: Exception) -> str:
+        """Return an error as a sentence, which says so where a run is refused."""
+        from fulcrum.sim.motion.joint_path import PathError
+
+        told = super().told(error)
+        refused = isinstance(error, PathError)
+        return f"{told.rstrip('.')}. Refused: nothing has moved." if refused else told
 
     def _request(self) -> tuple[Request, Preparation]:
         """Return what to run, and what is prepared of it."""
@@ -125,41 +131,6 @@ class RunCommand(Chosen):
         # Nothing is written before the run is known to be possible.
         out = results_folder(self.out, f"{chosen.name}-{controller}")
         how = self.seed, out, self.live, self.best_effort
-        return Request(chosen, controller, control, *how, world, planning), prepared
-
-
-def _print_report(report: Report, out: Path) -> None:
-    from rich.box import SIMPLE
-    from rich.console import Console
-    from rich.markup import escape
-    from rich.table import Table
-
-    console = Console()
-    colors = {"pass": "green", "fail": "red", "interrupted": "yellow"}
-    verdict = f"[bold {colors[report.verdict]}]{report.verdict.upper()}[/]"
-    console.print(f"{report.scenario}, controller {report.controller}: {verdict}")
-    for failure in report.failures:
-        console.print(f"  - {failure}", highlight=False)
-    for event in report.events:
-        console.print(f"  {event.t:.3f} s: {event.cause}: {event.reaction}", highlight=False)
-    table = Table("contact", "kept", "slip", "slide", "spin", "friction", "force error", box=SIMPLE)
-    table.add_row(*map(escape, ("", "[%]", "[mm]", "[mm]", "[deg]", "[%]", "[N]")), style="dim")
-    for name, c in report.contacts.items():
-        table.add_row(
-            name,
-            f"{c.kept_percent:.1f}",
-            f"{c.slip_mm:.3f}",
-            f"{c.slide_mm:.3f}",
-            f"{c.spin_deg:.3f}",
-            f"{100 * c.max_utilisation:.0f}",
-            f"{c.force_error_rms_n:.2f}",
-        )
-    console.print(table)
-    tilt, torque, timing = report.tilt, report.torque, report.timing
-    console.print(
-        f"tilt {tilt.final_deg:z.2f} of {tilt.target_deg:g} deg, error at most "
-        f"{tilt.max_error_deg:.3f} deg; torque at most {100 * torque.max_utilisation:.0f} % of its "
-        f"limit ({torque.joint}); {timing.real_time_factor:.1f} x real time",
-        highlight=False,
-    )
-    console.print(f"recording: {out / (report.recording or '')}", highlight=False, soft_wrap=True)
+        disturbed = self.disturbed or self.preset != "nominal" or bool(self.world)
+        request = Request(chosen, controller, control, *how, world, planning, disturbed)
+        return request, prepared

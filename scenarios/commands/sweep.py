@@ -20,16 +20,13 @@ from fulcrum.scenarios.commands.common import (
     removed_if_empty,
     results_folder,
 )
+from fulcrum.scenarios.commands.terminal import refuse, show
+from fulcrum.synthesis.render import page
 
 if TYPE_CHECKING:
-    from fulcrum.sim.run.execute import Result
     from fulcrum.sim.scenario.scenario import Scenario
     from fulcrum.sim.sweep.design import Sweep
-    from fulcrum.sim.sweep.summary import Score
     from fulcrum.sim.world.world import World
-
-# How many causes of failure the table names of each controller.
-_NAMED = 4
 
 
 @dataclass(frozen=True)
@@ -71,6 +68,9 @@ class SweepCommand(Chosen):
     seed: int = 0
     """Of the first world; the next have the next."""
 
+    require: float = 0.0
+    """Least success rate of every controller [%]; exit code 1 if one is lower."""
+
     map: str | None = None
     """The two parameters of the map, like mass,friction; the grid's, or mass,hand_friction."""
 
@@ -86,12 +86,15 @@ class SweepCommand(Chosen):
         from fulcrum.sim.sweep.farm import run_sweep
         from fulcrum.sim.sweep.picture import draw_map
         from fulcrum.sim.sweep.store import MAP, SUMMARY, Store
+        from fulcrum.synthesis.errors import InvalidInputError
 
+        if not 0.0 <= self.require <= 100.0:
+            raise InvalidInputError("--require", self.require, "a share in [0, 100] %")
         workers = Workers(self.workers, self.scheduler)
         try:
             sweep = self._sweep()
         except PlanError as error:
-            print(error)
+            refuse(f"{error}")
             return FAILED
         pair = self._map(sweep)
         folder = self.out or results_folder(None, f"sweep-{sweep.scenario.name}-{self.preset}")
@@ -99,7 +102,7 @@ class SweepCommand(Chosen):
         before, started = len(store.missing()), time.perf_counter()
         try:
             with removed_if_empty(folder), progress_bar(sweep.scenario.name) as move:
-                outcome = run_sweep(
+                swept = run_sweep(
                     sweep,
                     folder,
                     workers,
@@ -117,15 +120,15 @@ class SweepCommand(Chosen):
             )
             return INTERRUPTED
         minutes = (time.perf_counter() - started) / 60.0
-        found = outcome.scores
-        draw_map(outcome.rows, sweep, pair, store.folder / MAP)
+        found = swept.scores
+        draw_map(swept.rows, sweep, pair, store.folder / MAP)
         summary = {
             "scenario": sweep.scenario.name,
             "preset": self.preset,
             "episodes": self.episodes,
             "seed": self.seed,
             "grid": {name: list(values) for name, values in sweep.grid},
-            "criteria": dataclasses.asdict(sweep.criteria),
+            "tolerances": dataclasses.asdict(sweep.scenario.tolerances.disturbed),
             "controllers": {score.controller: dataclasses.asdict(score) for score in found},
             "map": list(pair),
         }
@@ -140,8 +143,15 @@ class SweepCommand(Chosen):
                 }
             }
         write_json(store.folder / SUMMARY, summary)
-        _print(found, store.folder, before / minutes if before else None)
-        return PASSED
+        pace = f", {before / minutes:.0f} episodes per minute" if before else ""
+        show(
+            swept.page()
+            + page(
+                f"{found[0].episodes} episodes each{pace}",
+                f"Rows, figures and map: {store.folder}",
+            )
+        )
+        return PASSED if all(100.0 * s.rate >= self.require for s in found) else FAILED
 
     def _sweep(self) -> Sweep:
         from fulcrum.sim.planning.execution import planned_tilt
@@ -205,42 +215,3 @@ def drawn_world(scenario: Scenario, preset: str, seed: int, values: str) -> Worl
 
     drawn = uncertainty.draw(uncertainty.preset(preset), scenario, seed)
     return overridden(drawn, scenario, parse_values("--world", values))
-
-
-def print_outcome(scenario: Scenario, result: Result) -> None:
-    """Prints whether a run would count as success in a sweep, and why not if not."""
-    from fulcrum.sim.model.robot_model import RobotModel
-    from fulcrum.sim.sweep.criteria import Criteria, violations
-
-    found = violations(Criteria(), scenario, RobotModel(scenario).joints, result)
-    texts = [f"{violation.text} at {violation.t:.2f} s" for violation in found]
-    print(f"in a sweep: {'failure: ' + ', '.join(texts) if texts else 'success'}")
-
-
-def _print(found: tuple[Score, ...], folder: Path, per_minute: float | None) -> None:
-    from rich.box import SIMPLE
-    from rich.console import Console
-    from rich.markup import escape
-    from rich.table import Table
-
-    console = Console(highlight=False)
-    table = Table("controller", "success", "95 %", "grip", "what failures began with", box=SIMPLE)
-    table.add_row(*map(escape, ("", "[%]", "[%]", "[N]", "[% of episodes]")), style="dim")
-    for score in found:
-        named = [f"{cause.cause} {100 * cause.share:.1f}" for cause in score.causes[:_NAMED]]
-        more = len(score.causes) - _NAMED
-        table.add_row(
-            score.controller,
-            f"{100 * score.rate:.1f}",
-            f"{100 * score.low:.1f} to {100 * score.high:.1f}",
-            f"{score.grip_n:.1f}",
-            ", ".join(named) + (f" and {more} more" if more > 0 else ""),
-        )
-    console.print(table)
-    for score in found:
-        if score.causes:
-            cause = score.causes[0]
-            console.print(f"{score.controller}, {cause.cause}: {cause.replay}", soft_wrap=True)
-    if per_minute is not None:
-        console.print(f"{found[0].episodes} episodes each, {per_minute:.0f} episodes per minute")
-    console.print(f"rows, figures and map: {folder}", soft_wrap=True)

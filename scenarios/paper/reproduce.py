@@ -28,6 +28,7 @@ from fulcrum.sim.scenario.control import controllers
 from fulcrum.sim.scenario.scenario import Scenario
 from fulcrum.synthesis import Objective
 from fulcrum.synthesis.arrays import N
+from fulcrum.synthesis.render import Line, Lines, Mark, Marked, Page, page
 
 Step = Callable[[str], None]
 STEPS = 7
@@ -47,6 +48,24 @@ class Reproduction:
 
     statements: tuple[Statement, ...]
     grip_errors: dict[str, list[float]]
+
+    def page(self) -> Page:
+        """Return every statement with both numbers and the reason, and the grips, as a page."""
+        lines: list[Line] = []
+        for s in self.statements:
+            numbers = (f": {s.statement}: ", Marked(s.paper), "; ours: ", Marked(s.ours))
+            lines += [(_MARKS[s.reproduced], *numbers), f"    {s.reason}"]
+        for name, errors in self.grip_errors.items():
+            percent = " and ".join(f"{100 * error:.2f} %" for error in errors)
+            lines.append(f"closed loop, {name}: measured grip within {percent} RMS of the computed")
+        return page(Lines(tuple(lines)))
+
+
+_MARKS = {
+    True: Marked("reproduced", Mark.GOOD),
+    False: Marked("not reproduced", Mark.BAD),
+    None: Marked("side by side"),
+}
 
 
 def reproduce(out: Path, step: Step) -> Reproduction:

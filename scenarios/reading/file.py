@@ -6,6 +6,7 @@ allows it.
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 from pathlib import Path
 from typing import Any, TypeVar
@@ -16,7 +17,7 @@ from fulcrum.scenarios.reading.access import Access
 from fulcrum.scenarios.reading.build import build
 from fulcrum.scenarios.reading.places import vector
 from fulcrum.scenarios.reading.source import FileError, Source, explained, nearest
-from fulcrum.scenarios.schema.keys import Table
+from fulcrum.scenarios.schema.keys import FileTable
 from fulcrum.scenarios.schema.tables import LiftedFile, ScenarioFile
 from fulcrum.sim.scenario.path import Pivot
 from fulcrum.sim.scenario.phases import HOLD, tilting
@@ -75,7 +76,7 @@ def open_source(file: Path) -> Source:
         raise FileError(file, None, "", "no UTF-8 text", valid) from None
 
 
-Model = TypeVar("Model", bound=Table)
+Model = TypeVar("Model", bound=FileTable)
 
 
 def _validated(source: Source, model: type[Model]) -> Model:
@@ -155,5 +156,12 @@ def schema() -> dict[str, Any]:
     return {
         "$schema": "https://json-schema.org/draft/2020-12/schema",
         "title": _TITLE,
-        **made,
+        **_named_infinities(made),
     }
+
+
+def _named_infinities(value: Any) -> Any:
+    """The value with infinite defaults, which JSON does not know, as TOML spells them."""
+    if isinstance(value, dict):
+        return {key: _named_infinities(item) for key, item in value.items()}
+    return "inf" if value == math.inf else value

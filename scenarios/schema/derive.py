@@ -21,8 +21,8 @@ from annotated_types import Len
 from pydantic import Field, GetCoreSchemaHandler, create_model
 from pydantic_core import CoreSchema, core_schema
 
-from fulcrum.scenarios.schema.keys import Table
-from fulcrum.synthesis.settings import Inline, Key, Settings, hints, said
+from fulcrum.scenarios.schema.keys import FileTable
+from fulcrum.synthesis.settings import Inline, Key, Settings, Unlimited, hints, said
 
 
 class _Derived:
@@ -36,15 +36,15 @@ class _Derived:
 
 
 T = TypeVar("T", bound=Settings)
-AnyTable = TypeVar("AnyTable", bound=Table)
+AnyTable = TypeVar("AnyTable", bound=FileTable)
 FromTable = Annotated[T, _Derived()]
-_TABLES: dict[type, type[Table]] = {}
+_TABLES: dict[type, type[FileTable]] = {}
 
 
-def table_of(settings: type) -> type[Table]:
+def table_of(settings: type) -> type[FileTable]:
     """The table of a settings class, as a model."""
     if settings not in _TABLES:
-        _TABLES[settings] = derived(settings.__name__, Table, settings)
+        _TABLES[settings] = derived(settings.__name__, FileTable, settings)
     return _TABLES[settings]
 
 
@@ -97,7 +97,7 @@ def _key(settings: type, field: str) -> tuple[str | None, type[Settings] | None]
     return (key.name if key else field), inline
 
 
-def instance(settings: type[T], table: Table, **instead: Any) -> T:
+def instance(settings: type[T], table: FileTable, **instead: Any) -> T:
     """The instance of a settings class that a table stands for, with some fields set otherwise."""
     values: dict[str, Any] = {}
     for field in hints(settings):
@@ -114,7 +114,8 @@ def _in_file(annotation: Any) -> Any:
     """What TOML has for a kind of value: lists for tuples, texts for enumerations, tables."""
     origin, arguments = get_origin(annotation), get_args(annotation)
     if origin is Annotated:
-        return Annotated[(_in_file(arguments[0]), *arguments[1:])]
+        unlimited = (Field(allow_inf_nan=True),) if Unlimited in arguments else ()
+        return Annotated[(_in_file(arguments[0]), *arguments[1:], *unlimited)]
     if origin in (Union, UnionType):
         return reduce(or_, map(_in_file, arguments))
     if origin is tuple:

@@ -28,7 +28,7 @@ Colour = Annotated[list[Share], Len(4, 4)]
 Face = Annotated[str, Field(max_length=20, examples=["+y"])]
 
 
-class Table(BaseModel):
+class FileTable(BaseModel):
     """A table of the file: no other keys than these, no conversions, no infinite numbers."""
 
     model_config = ConfigDict(
@@ -40,7 +40,7 @@ class Table(BaseModel):
     )
 
 
-class Placed(Table):
+class Placed(FileTable):
     """Something with a pose."""
 
     position_m: Vector3 = [0.0, 0.0, 0.0]

@@ -8,7 +8,7 @@ from annotated_types import Len
 from pydantic import Discriminator, Field, Tag
 
 from fulcrum.scenarios.schema.derive import FromTable, same
-from fulcrum.scenarios.schema.keys import PREFIX, Corner, Direction, Placed, Table, Vector3
+from fulcrum.scenarios.schema.keys import PREFIX, Corner, Direction, FileTable, Placed, Vector3
 from fulcrum.sim.scenario.path import Angle, Pivot
 from fulcrum.sim.scenario.phases import REACH, TILT, Duration, Gap, Phase
 from fulcrum.sim.scenario.robot import Robot
@@ -52,7 +52,7 @@ class RobotTable(Placed):
     start_deviation: NotNegative = same(Robot, "start_deviation")
 
 
-class TurnTable(Table):
+class TurnTable(FileTable):
     """A turn about an edge of the box, or about an axis."""
 
     angle_deg: Angle = same(Pivot, "angle_deg")
@@ -93,7 +93,7 @@ class PoseTable(Placed):
     """Position in the world [m]."""
 
 
-class PosesTable(Table):
+class PosesTable(FileTable):
     """Poses that the object passes, smoothly in between, from where it is at the start."""
 
     kind: Literal["poses"]
@@ -118,7 +118,7 @@ AnyPath = Annotated[
 After = Literal["leave", "hold"]
 
 
-class ManoeuvreTable(Table):
+class ManoeuvreTable(FileTable):
     """Timing of the phases: approach, touch, grip, tilt, and what comes then."""
 
     approach_s: Duration = _APPROACH.duration_s

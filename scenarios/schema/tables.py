@@ -19,11 +19,11 @@ from fulcrum.scenarios.schema.keys import (
     Corner,
     Direction,
     Face,
+    FileTable,
     Name,
     Place2,
     Placed,
     Size3,
-    Table,
     Vector3,
 )
 from fulcrum.scenarios.schema.motion import After, AnyPath, ManoeuvreTable, RobotTable
@@ -77,7 +77,7 @@ SHAPES: dict[str, type[Shape]] = {
 def _object_table(name: str, shape: type[Shape]) -> type[ObjectTable]:
     """The table of an object with a shape: keys of any object, and those of the shape."""
     tag: Any = (Literal[name], Field(description=ObjectTable.model_fields["shape"].description))
-    return derived(f"{shape.__name__}Table", ObjectTable, shape, shape=tag)
+    return derived(f"{shape.__name__}FileTable", ObjectTable, shape, shape=tag)
 
 
 if TYPE_CHECKING:
@@ -113,7 +113,7 @@ class SurfaceTable(Placed):
     """Colour and opacity."""
 
 
-class HandTable(Table):
+class HandTable(FileTable):
     """A robot's hand, and where it holds the object: at a face, or at a point."""
 
     mount: Text
@@ -155,7 +155,7 @@ class HandTable(Table):
     """Largest normal force [N]; none, if it is left out."""
 
 
-class SupportTable(Table):
+class SupportTable(FileTable):
     """A point of the object, or a corner, that stays on a surface while the object tilts."""
 
     surface: Name
@@ -175,7 +175,7 @@ class SupportTable(Table):
     is along z."""
 
 
-class ScenarioFile(Table):
+class ScenarioFile(FileTable):
     """A scenario: what is tilted, on what, by whom, along which path, and what is success."""
 
     summary: Text = same(Scenario, "summary")
@@ -216,7 +216,7 @@ class ScenarioFile(Table):
     """Where recordings look from."""
 
 
-class LiftedFile(Table):
+class LiftedFile(FileTable):
     """A scenario like another one, without the environment's help: the object is to come off."""
 
     summary: Text = same(Scenario, "summary")

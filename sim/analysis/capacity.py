@@ -22,6 +22,7 @@ from fulcrum.sim.signals.progress import Progress
 from fulcrum.synthesis import InfeasibleError, Synthesizer
 from fulcrum.synthesis.analysis.conflict import Conflict, conflict
 from fulcrum.synthesis.analysis.relaxation import Kind, change, weight_range
+from fulcrum.synthesis.render import Marked, Page, page
 
 _STEP_DEG = 1.0
 # How well the tightest tilt is found [deg].
@@ -53,6 +54,37 @@ class Capacity:
     confirmed_within: float
     tilts_deg: tuple[float, ...]
     weights: tuple[float, ...]
+
+    def page(self) -> Page:
+        """Return the capacity, what limits it, and how well that is confirmed as a page."""
+        if self.weight == math.inf:
+            return page(f"{self.manoeuvre}: any weight; nothing limits the grip")
+        curve = dict(zip(self.tilts_deg, self.weights, strict=True))
+        end = max(curve)
+        lightest = limited = confirmed = ""
+        if self.lightest > 0.0:
+            lightest = f"  at least {self.lightest:.4g} N, as the preloads ask"
+        if self.conflict is not None:
+            limits, balances = ", ".join(self.conflict.limits), ", ".join(self.conflict.balances)
+            limited = f"  there {limits} against {balances}"
+        if self.weight > 0.0 and math.isfinite(self.confirmed_within):
+            confirmed = (
+                "  feasible just below and infeasible just above, when solved again "
+                f"{self.confirmed_within:.0e} to either side"
+            )
+        elif self.weight > 0.0:
+            confirmed = "  not confirmed by solving again to either side"
+        return page(
+            (
+                Marked(self.manoeuvre),
+                f": {self.weight:.4g} N ({self.mass:.4g} kg), limited at {self.tilt_deg:.4g} deg; "
+                f"{curve[0.0]:.4g} N at 0 deg, {curve[end]:.4g} N at {end:g} deg, "
+                f"{max(curve.values()):.4g} N at best",
+            ),
+            lightest,
+            limited,
+            confirmed,
+        )
 
 
 def capacities(

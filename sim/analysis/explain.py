@@ -3,112 +3,22 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 
 import numpy as np
 
+from fulcrum.sim.analysis.explanation import RELAXED, Explanation, Influence, Optimum, Remedy
 from fulcrum.sim.planning.path_problems import PathProblems
 from fulcrum.synthesis import InfeasibleError, Solution, Synthesizer
 from fulcrum.synthesis.analysis.conflict import Conflict, and_list, conflict, relaxed, tightest
 from fulcrum.synthesis.analysis.relaxation import Change, ChangeOutcome, Kind, changes, weight_range
-from fulcrum.synthesis.analysis.sensitivity import UNITS, Sensitivities, sensitivities
+from fulcrum.synthesis.analysis.sensitivity import UNITS, sensitivities
 from fulcrum.synthesis.arrays import N
 from fulcrum.synthesis.problem import Gravity, Problem
 
 # Steps of the scan for the tightest tilt [deg].
 _SCAN_DEG = 5.0
-# By which share of it a limit is relaxed to see whether that helps.
-RELAXED = 0.1
 # How near to its limit, relative, a force, torque or utilisation counts as at it.
 _ACTIVE = 1e-6
-
-
-@dataclass(frozen=True)
-class Remedy:
-    """One kind of change: what is needed of it, or what can be borne.
-
-    Attributes:
-        outcome: See :class:`synthesis.analysis.relaxation.ChangeOutcome`.
-        factor: The border of the feasible factors [-]; infinite for "any weight".
-        confirmed_within: How near to the border solving again tells feasible from infeasible [-];
-            infinite if not confirmed.
-        text: In words.
-        conflict: What stands in the way beyond the border.
-    """
-
-    outcome: ChangeOutcome
-    factor: float
-    confirmed_within: float
-    text: str
-    conflict: Conflict | None
-
-
-@dataclass(frozen=True)
-class Influence:
-    """What a parameter does to the objective.
-
-    Attributes:
-        value: Of the parameter.
-        unit: Of the parameter.
-        slope: Derivative of the objective by it, in their units.
-        per_percent: Change of the objective per percent of the parameter [%].
-    """
-
-    value: float
-    unit: str
-    slope: float
-    per_percent: float
-
-
-@dataclass(frozen=True)
-class Optimum:
-    """The optimal solution of a feasible problem.
-
-    Attributes:
-        value: The objective, in ``unit``.
-        unit: N, N·m or -.
-        normal_forces: Of each contact [N].
-        active: Limits that are reached.
-        sensitivities: Derivatives of the value.
-        influences: The parameters that matter, by name.
-    """
-
-    value: float
-    unit: str
-    normal_forces: dict[str, float]
-    active: tuple[str, ...]
-    sensitivities: Sensitivities
-    influences: dict[str, Influence]
-
-
-@dataclass(frozen=True)
-class Explanation:
-    """All that is to be said about a scenario's problem at one tilt.
-
-    Attributes:
-        scenario: Name of the scenario.
-        object: Name of the object.
-        objective: What is minimised.
-        tilt_deg: [deg].
-        weight: Of the object [N].
-        feasible: Whether there are forces.
-        conflict: Why not, of an infeasible problem.
-        gains: By how much more weight can be held [-] if one limit of the conflict alone is relaxed
-            by ``RELAXED``; of an infeasible problem that holds some weight.
-        optimum: The solution of a feasible one.
-        changes: By kind: what would help, or what is borne.
-    """
-
-    scenario: str
-    object: str
-    objective: str
-    tilt_deg: float
-    weight: float
-    feasible: bool
-    conflict: Conflict | None
-    gains: dict[str, float]
-    optimum: Optimum | None
-    changes: dict[Kind, Remedy]
 
 
 def tightest_tilt(problems: PathProblems, synthesizer: Synthesizer) -> float:

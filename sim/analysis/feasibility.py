@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, replace
 
 import numpy as np
 
-from fulcrum.sim.analysis.explain import Explanation, explain
+from fulcrum.sim.analysis.explain import explain
+from fulcrum.sim.analysis.explanation import Explanation
 from fulcrum.sim.analysis.surroundings import Surroundings, surroundings
 from fulcrum.sim.model.grip import GripSchedule
 from fulcrum.sim.model.robot_model import RobotModel
@@ -29,6 +31,7 @@ from fulcrum.synthesis import (
     UnboundedError,
 )
 from fulcrum.synthesis.arrays import Array, N
+from fulcrum.synthesis.render import Lines, Mark, Marked, Page, page, table
 from fulcrum.synthesis.robust.certificate import RobustInfeasibleError
 
 # Steps of the tilt [deg].
@@ -92,6 +95,78 @@ class Feasibility:
         """Whether arms and forces can do it, and surfaces leave room and bear the object."""
         fits = not self.surroundings.misfits
         return fits and self.unreachable is None and self.curves.holds
+
+    def page(self, scenario: Scenario, controller: str) -> Page:
+        """Return the answers, and why not, as a page.
+
+        Args:
+            scenario: What was asked about.
+            controller: Name of the controller whose margins count.
+        """
+        verdict = (
+            Marked("FEASIBLE", Mark.GOOD) if self.feasible else Marked("NOT FEASIBLE", Mark.BAD)
+        )
+        head = ("question", "answer", "at")
+        shown = page(
+            (f"{scenario.name}, controller {controller}: ", verdict),
+            table(head, [*self._fits(scenario), *self._reach(), *self._forces(scenario)]),
+            Lines(tuple(misfit.text for misfit in self.surroundings.misfits)),
+        )
+        return shown if self.explanation is None else shown + self.explanation.page(controller)
+
+    def _fits(self, scenario: Scenario) -> list[tuple[str, str, str]]:
+        contacts = f"{len(scenario.hands)} hands, {len(scenario.supports)} supports"
+        around = self.surroundings
+        return [
+            (question, "yes", where)
+            if misfit is None
+            else (question, "no: see below", f"{misfit.tilt_deg:.1f} deg")
+            for question, misfit, where in (
+                ("contacts on the surface", around.supports, contacts),
+                ("room for the object", around.room, ""),
+                ("stands before and after", around.stand, ""),
+            )
+        ]
+
+    def _reach(self) -> list[tuple[str, str, str]]:
+        if self.unreachable is not None:
+            why = "; ".join(self.unreachable.reasons)
+            where = f"{self.unreachable.tilt_deg:.1f} deg"
+            return [("reach, speeds, collisions", f"no: {why}", where)]
+        joint = min(self.clearances, key=lambda name: self.clearances[name])
+        near = f"{self.clearances[joint]:.3g} rad or m"
+        return [
+            ("reach, speeds, collisions", "yes", ""),
+            ("least distance to a joint limit", near, joint),
+        ]
+
+    def _forces(self, scenario: Scenario) -> list[tuple[str, str, str]]:
+        curves, tilts = self.curves, self.curves.tilts_deg
+        held = np.isfinite(curves.used)
+        where = f"0 to {tilts[-1]:g} deg"
+        if not held.all():
+            more = np.count_nonzero(~held) - 1
+            where = f"{tilts[~held][0]:.3g} deg, and {more} more of {len(tilts)}"
+        rows = [("forces over the path", "yes" if held.all() else "no", where)]
+        if held.any():
+            step, hand = np.unravel_index(np.nanargmax(curves.grip), curves.grip.shape)
+            where = f"{scenario.hands[hand].name}, {tilts[step]:.3g} deg"
+            rows.append(("largest grip", f"{curves.grip[step, hand]:.1f} N", where))
+            if np.isfinite(curves.torque).any():
+                k = int(np.nanargmax(curves.torque))
+                share = f"{100.0 * curves.torque[k]:.0f} % of its limit"
+                rows.append(("largest torque", share, f"{curves.joint[k]}, {tilts[k]:.3g} deg"))
+            k = int(np.nanargmax(curves.used))
+            margin = f"{100.0 * (1.0 - curves.used[k]):.0f} %"
+            rows.append(
+                ("least friction margin", margin, f"{curves.contact[k]}, {tilts[k]:.3g} deg")
+            )
+        if self.grip is not None:
+            k = int(np.argmin(self.grip.shares))
+            share = f"{100.0 * self.grip.shares[k]:.0f} %"
+            at = f"{math.degrees(self.grip.tilts[k]):g} deg"
+            rows.append(("uncertainty borne by one grip", share, at))
+        return rows
 
 
 def feasibility(scenario: Scenario, control: Control) -> Feasibility:

@@ -29,7 +29,7 @@ import math
 from collections.abc import Sequence
 
 from fulcrum.sim.scenario.control import Guard
-from fulcrum.sim.signals.event import Cause, Event, Finding, Mode
+from fulcrum.sim.signals.event import Cause, Event, Finding, Mode, Reaction
 
 # What is left to be seen after the end: that everything rests [s].
 _AFTER_S = 1.0
@@ -98,17 +98,17 @@ class Supervisor:
             return
         for cause, text in found.items():
             if t - self._since[cause] >= STOPPING.get(cause, math.inf):
-                self._stop(t, text, cause)
+                self._stop(t, cause, text)
                 return
         if self.mode is Mode.RUN:
-            self._hold(t, next(iter(found.values())))
+            self._hold(t, *next(iter(found.items())))
         elif self.mode is Mode.HOLD:
             self._wait(t, found, lowerable)
         else:
             self._lower(t, found, path_t)
 
-    def _hold(self, t: float, text: str) -> None:
-        self._enter(Mode.HOLD, t, text)
+    def _hold(self, t: float, cause: Cause, text: str) -> None:
+        self._enter(Mode.HOLD, t, cause, text)
         self._held_from = self._last_trouble = t
 
     def _wait(self, t: float, found: dict[Cause, str], lowerable: bool) -> None:
@@ -118,36 +118,37 @@ class Supervisor:
         held_s = t - self._held_from
         if t - self._last_trouble >= _SETTLED_S:
             self._held_s += held_s
-            self._enter(Mode.RUN, t, f"it passed after {held_s:.2f} s")
+            self._enter(Mode.RUN, t, self.events[-1].cause, f"it passed after {held_s:.2f} s")
         elif held_s >= self._settings.hold_s or self._held_s + held_s >= self._settings.holds_s:
-            text = next((text for cause, text in found.items() if cause not in STOPPING), None)
-            if text is None:
+            persists = next((item for item in found.items() if item[0] not in STOPPING), None)
+            if persists is None:
                 return
             if lowerable:
-                self._enter(Mode.LOWER, t, text)
+                self._enter(Mode.LOWER, t, *persists)
                 self._lowered_from = t
             else:
-                self._stop(t, text)
+                self._stop(t, *persists)
 
     def _lower(self, t: float, found: dict[Cause, str], path_t: float) -> None:
         """Ends at the path's start; stops if a cause lasts that keeps the arms from following."""
         for cause in _BLOCKING:
             since = max(self._since.get(cause, math.inf), self._lowered_from)
             if t - since >= self._settings.lower_s and not math.isfinite(self._ends_at):
-                self._stop(t, f"lowering is blocked, {found[cause]}")
+                self._stop(t, cause, f"lowering is blocked, {found[cause]}")
                 return
         if path_t <= 0.0 and not math.isfinite(self._ends_at):
             self._ends_at = t + _AFTER_S
-            self.events.append(Event(t, "the hands are back where they began", "end"))
+            text = "the hands are back where they began"
+            self.events.append(Event(t, self.events[-1].cause, Reaction.END, text))
 
-    def _stop(self, t: float, text: str, cause: Cause | None = None) -> None:
-        self._enter(Mode.STOP, t, text)
+    def _stop(self, t: float, cause: Cause, text: str) -> None:
+        self._enter(Mode.STOP, t, cause, text)
         self._ends_at = t + _AFTER_S
         # Arms that hold the object come to rest on the path; an abrupt stop would shake it off.
         self.stands = cause is not Cause.ENCODER
         if cause in _LETTING_GO:
             self._let_go_at = t
 
-    def _enter(self, mode: Mode, t: float, text: str) -> None:
+    def _enter(self, mode: Mode, t: float, cause: Cause, text: str) -> None:
         self.mode = mode
-        self.events.append(Event(t, text, mode.name.lower()))
+        self.events.append(Event(t, cause, Reaction(mode.name.lower()), text))

@@ -1,4 +1,4 @@
-"""What a run gave: verdict, failures in words, and the numbers that they rest on."""
+"""What a run gave: verdict, outcome, failures, and the numbers that they rest on."""
 
 from __future__ import annotations
 
@@ -7,7 +7,19 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from enum import StrEnum
 
+from fulcrum.sim.evaluation.failure import Failure
+from fulcrum.sim.evaluation.outcome import Outcome
 from fulcrum.sim.signals.event import Event
+from fulcrum.synthesis.render import (
+    Bullets,
+    Heading,
+    Mark,
+    Marked,
+    Page,
+    page,
+    table,
+    to_markdown,
+)
 
 
 class Verdict(StrEnum):
@@ -16,6 +28,18 @@ class Verdict(StrEnum):
     PASS = "pass"
     FAIL = "fail"
     INTERRUPTED = "interrupted"
+
+    @property
+    def shown(self) -> Marked:
+        """The verdict as pages show it."""
+        return Marked(self.upper(), _MARKS[self])
+
+
+_MARKS = {
+    Verdict.PASS: Mark.GOOD,
+    Verdict.FAIL: Mark.BAD,
+    Verdict.INTERRUPTED: Mark.DOUBTFUL,
+}
 
 
 @dataclass(frozen=True)
@@ -92,16 +116,19 @@ class TimingReport:
 class Report:
     """The result of a run, as ``report.json`` holds it; finite numbers only.
 
-    ``phases`` are in the order in which they were come through, backwards while lowering;
-    ``events`` is what the guard found, and what it did.
+    ``disturbed`` says whether the tolerances for disturbed runs counted. ``failures`` are in order
+    of time, so that the first is the cause. ``phases`` are in the order in which they were come
+    through, backwards while lowering; ``events`` is what the guard found, and what it did.
     """
 
     scenario: str
     controller: str
     objective: str
     seed: int
+    disturbed: bool
     verdict: Verdict
-    failures: tuple[str, ...]
+    outcome: Outcome
+    failures: tuple[Failure, ...]
     events: tuple[Event, ...]
     phases: tuple[PhaseReport, ...]
     tilt: TiltReport
@@ -111,10 +138,45 @@ class Report:
     timing: TimingReport
     recording: str | None
 
-    def _repr_markdown_(self) -> str:
-        from fulcrum.sim.run.notebook import report_markdown
+    @property
+    def sentences(self) -> tuple[str, ...]:
+        """The failures in words."""
+        return tuple(failure.text for failure in self.failures)
 
-        return report_markdown(self)
+    def page(self) -> Page:
+        """Return verdict, failures, events and contacts as a page."""
+        tilt, torque, timing = self.tilt, self.torque, self.timing
+        contacts = [
+            (
+                name,
+                f"{c.kept_percent:.1f}",
+                f"{c.slip_mm:.3f}",
+                f"{c.slide_mm:.3f}",
+                f"{c.spin_deg:.3f}",
+                f"{100.0 * c.max_utilisation:.0f}",
+                f"{c.force_error_rms_n:.2f}",
+            )
+            for name, c in self.contacts.items()
+        ]
+        head = ("contact", "kept [%]", "slip [mm]", "slide [mm]", "spin [deg]")
+        judged = ", judged as a disturbed run" if self.disturbed else ""
+        return page(
+            Heading((f"{self.scenario}: ", self.verdict.shown)),
+            Bullets(self.sentences),
+            table(
+                ("time [s]", "found", "done"),
+                [(f"{e.t:.3f}", e.text, e.reaction) for e in self.events],
+            ),
+            f"Outcome: {self.outcome}. Controller {self.controller}, objective {self.objective}, "
+            f"seed {self.seed}{judged}.",
+            table((*head, "friction used [%]", "force error [N]"), contacts),
+            f"Tilt {tilt.final_deg:z.2f} of {tilt.target_deg:g} deg, error at most "
+            f"{tilt.max_error_deg:.3f} deg; torque at most {100 * torque.max_utilisation:.0f} % of "
+            f"its limit ({torque.joint}); {timing.real_time_factor:.1f} x real time.",
+        )
+
+    def _repr_markdown_(self) -> str:
+        return to_markdown(self.page())
 
 
 @dataclass(frozen=True)

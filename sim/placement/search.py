@@ -287,7 +287,7 @@ def _run(packed: bytes, candidate: Scenario) -> Report | str:
         report = execute(Request(candidate, task.controller, task.control)).report
     except FulcrumError as error:
         return str(error)
-    return report if report.verdict is Verdict.PASS else "; ".join(report.failures)
+    return report if report.verdict is Verdict.PASS else "; ".join(report.sentences)
 
 
 @contextlib.contextmanager

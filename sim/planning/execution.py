@@ -31,7 +31,6 @@ from fulcrum.sim.planning.problem import CERTAIN, Margins, own_margins
 from fulcrum.sim.planning.robust_plan import robust_plan
 from fulcrum.sim.scenario.control import controllers
 from fulcrum.sim.scenario.phases import Phase, stretched, tilting
-from fulcrum.sim.scenario.physics import Tolerances
 from fulcrum.sim.scenario.scenario import Scenario
 from fulcrum.sim.scenario.timing import Timing
 from fulcrum.synthesis import InvalidInputError
@@ -119,11 +118,11 @@ def planned_tilt(
         scenario,
         phases=timed(scenario.phases, timing),
         physics=replace(scenario.physics, solref=_SOLREF, solimp=_SOLIMP),
-        tolerances=Tolerances(
+        tolerances=replace(
+            limits,
             final_deg=0.5,
             error_deg=1.0,
             slip_mm=1.0,
-            spin_deg=limits.spin_deg,
             utilisation=1.01,  # slip counts; what is over 1 is rounding
             force_error=0.1,  # 5 % without deviations, as forces jump with the acceleration
             saturated_s=0.02,

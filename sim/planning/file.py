@@ -47,23 +47,6 @@ def plan_content(plan: Plan) -> dict[str, Any]:
         },
         "active": [
             {"from_deg": low, "to_deg": high, "limits": list(limits)}
-            for low, high, limits in stretches(plan)
+            for low, high, limits in plan.stretches()
         ],
     }
-
-
-def stretches(plan: Plan) -> list[tuple[float, float, tuple[str, ...]]]:
-    """Stretches of the path along which the same limits are used up: from, to [deg], and which."""
-    found = plan.solution
-    used = found.active()
-    tilts = np.degrees(plan.tilt)
-    merged: list[tuple[float, float, tuple[str, ...]]] = []
-    for k in range(len(tilts) - 1):
-        # A limit that either end of an interval uses up is active in it.
-        limits = tuple(dict.fromkeys((*used[2 * k], *used[2 * k + 1])))
-        low, high = float(tilts[k]), float(tilts[k + 1])
-        if merged and set(merged[-1][2]) == set(limits):
-            merged[-1] = (merged[-1][0], high, merged[-1][2])
-        else:
-            merged.append((low, high, limits))
-    return merged

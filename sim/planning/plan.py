@@ -16,13 +16,17 @@ from fulcrum.sim.scenario.scenario import Scenario
 from fulcrum.synthesis import FulcrumError, InvalidInputError
 from fulcrum.synthesis.arrays import Array, Indices
 from fulcrum.synthesis.checks import positive
+from fulcrum.synthesis.markdown import number
 from fulcrum.synthesis.path.loads import solve_many
 from fulcrum.synthesis.path.problem import PathObjective, PathProblem
 from fulcrum.synthesis.path.solution import InfeasiblePathError, PathSolution
+from fulcrum.synthesis.render import Marked, Page, page, table, to_markdown
 from fulcrum.synthesis.robust.uncertainty_set import UncertaintySet
 
 # What the solver's accuracy may add to a limit that a plan uses up, as a share of it [-].
 _EXCESS = 1e-6
+# Limits of which less than this share is used at most are not listed [-].
+_LISTED = 0.5
 
 
 class PlanError(FulcrumError):
@@ -200,10 +204,59 @@ class Plan:
             worst = max(broken, key=lambda name: broken[name][0])
             raise PlanError(self.scenario.name, what, [(worst, broken[worst][1])])
 
-    def _repr_markdown_(self) -> str:
-        from fulcrum.sim.run.notebook import plan_markdown
+    def stretches(self) -> list[tuple[float, float, tuple[str, ...]]]:
+        """Stretches of the path along which the same limits are used up: from, to [deg], which."""
+        used = self.solution.active()
+        tilts = np.degrees(self.tilt)
+        merged: list[tuple[float, float, tuple[str, ...]]] = []
+        for k in range(len(tilts) - 1):
+            # A limit that either end of an interval uses up is active in it.
+            limits = tuple(dict.fromkeys((*used[2 * k], *used[2 * k + 1])))
+            low, high = float(tilts[k]), float(tilts[k + 1])
+            if merged and set(merged[-1][2]) == set(limits):
+                merged[-1] = (merged[-1][0], high, merged[-1][2])
+            else:
+                merged.append((low, high, limits))
+        return merged
 
-        return plan_markdown(self)
+    def page(self) -> Page:
+        """Return duration, proof, stretches of the tilt and the limits used most as a page."""
+        found, residuals = self.solution, self.solution.residuals
+        places = np.degrees(self.tilt[found.problem.stations[:, 0]])
+        used = sorted(found.shares.items(), key=lambda item: -item[1].max())
+        grip = (
+            f"One grip for {len(found.problem.loads)} worlds: {100 * self.share:.0f} % of the set"
+        )
+        return page(
+            (
+                Marked(f"{self.scenario.name}, {found.problem.objective}"),
+                ": ",
+                Marked(f"{self.duration:.4f} s"),
+                f" for {number(self.scenario.path.angle_deg)} deg, at most "
+                f"{math.degrees(self.peak_rate):.1f} deg/s; solved in {1e3 * found.solve_s:.0f} ms",
+            ),
+            f"{grip} of controller robust." if len(found.problem.loads) > 1 else "",
+            f"Limits and balance kept to {max(residuals.primal, 0.0):.1e}, optimal to "
+            f"{max(residuals.dual, residuals.gap):.1e}.",
+            table(
+                ("tilt [deg]", "limits used up"),
+                [
+                    (f"{low:.1f} to {high:.1f}", ", ".join(limits) or "none")
+                    for low, high, limits in self.stretches()
+                ],
+            ),
+            table(
+                ("limit", "used at most [%]", "at [deg]"),
+                [
+                    (name, f"{100.0 * share.max():.1f}", f"{places[int(share.argmax())]:.1f}")
+                    for name, share in used
+                    if share.max() >= _LISTED
+                ],
+            ),
+        )
+
+    def _repr_markdown_(self) -> str:
+        return to_markdown(self.page())
 
 
 def plan(

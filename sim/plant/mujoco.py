@@ -124,10 +124,11 @@ class MujocoPlant:
 
     def step(self) -> None:
         """See :meth:`Plant.step`."""
+        t = self._data.time  # which MuJoCo sets back where it finds the state beyond all numbers
         # As dm_control's own step, whose search for warnings takes a sixth as long as the step.
         mujoco.mj_step(self._model, self._data)
         if np.count_nonzero(self._warnings):
-            raise DivergedError(self._data.time)
+            raise DivergedError(t)
         self.log()
 
     def log(self) -> None:

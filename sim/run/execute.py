@@ -22,13 +22,13 @@ from fulcrum.sim.plant.protocol import DivergedError
 from fulcrum.sim.recording import Recorder, open_viewer
 from fulcrum.sim.run.assembly import closed_loop
 from fulcrum.sim.run.files import check_new_folder, finite, write_json
-from fulcrum.sim.run.notebook import report_markdown
 from fulcrum.sim.run.preparation import Preparation, prepare
 from fulcrum.sim.scenario.control import Control, controller, default_controller
 from fulcrum.sim.scenario.scenario import Scenario
 from fulcrum.sim.signals.progress import Progress
 from fulcrum.sim.signals.trace import Trace
 from fulcrum.sim.world.world import NO_DEVIATION, World
+from fulcrum.synthesis.render import Page, page, to_markdown
 
 RECORDING, CONFIG, REPORT = "run.rrd", "config.json", "report.json"
 # Whose versions may change a run's numbers.
@@ -50,6 +50,8 @@ class Request:
             with those nearest to balance there.
         world: What is true of the plant beyond the scenario; nothing else by default.
         planning: How the tilt is planned; None for the scenario's own timing.
+        disturbed: Whether the scenario's tolerances for disturbed runs count; if None, they do
+            where the world is not as believed.
     """
 
     scenario: Scenario
@@ -61,6 +63,7 @@ class Request:
     best_effort: bool = False
     world: World = NO_DEVIATION
     planning: Planning | None = None
+    disturbed: bool | None = None
 
     def __post_init__(self) -> None:
         _ = self.settings  # a name that stands for none is refused
@@ -79,6 +82,11 @@ class Request:
             return controller(self.scenario.control, self.name)
         return self.control
 
+    @property
+    def judged_as_disturbed(self) -> bool:
+        """Whether the tolerances for disturbed runs count, given or not."""
+        return self.world != NO_DEVIATION if self.disturbed is None else self.disturbed
+
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Result:
@@ -89,10 +97,13 @@ class Result:
     history: ContactHistory
     error: str | None = None
 
-    def _repr_markdown_(self) -> str:
-        from fulcrum.sim.run.notebook import result_markdown
+    def page(self) -> Page:
+        """Return the report, and what ended the run, if something did, as a page."""
+        ended = "" if self.error is None else f"Ended by: {self.error}"
+        return self.report.page() + page(ended)
 
-        return result_markdown(self)
+    def _repr_markdown_(self) -> str:
+        return to_markdown(self.page())
 
 
 def execute(
@@ -133,8 +144,8 @@ def execute(
         best_effort=request.best_effort,
     )
     truth, robot = loop.truth, loop.robot
-    monitor = Monitor(truth)
-    judge = Judge(truth, robot.joints, robot.tau_min, robot.tau_max)
+    monitor, limits = Monitor(truth), (robot.tau_min, robot.tau_max)
+    judge = Judge(truth, robot.joints, *limits, disturbed=request.judged_as_disturbed)
     recorder = None
     histories: list[ContactHistory] = []
     error: str | None = None
@@ -145,7 +156,6 @@ def execute(
             out.mkdir(parents=True, exist_ok=True)
             config = resolved_config(request)
             write_json(out / CONFIG, config)
-            limits = robot.tau_min, robot.tau_max
             recorder = Recorder(
                 out / RECORDING,
                 truth,
@@ -185,7 +195,7 @@ def execute(
         report = judge.report(info, trace, history)
         if out is not None and recorder is not None:
             write_json(out / REPORT, dataclasses.asdict(report))
-            recorder.close(report_markdown(report))
+            recorder.close(to_markdown(report.page()))
     return Result(report, trace, history, error)
 
 
@@ -227,6 +237,7 @@ def resolved_config(request: Request) -> dict[str, Any]:
         {
             "controller": request.name,
             "seed": request.seed,
+            "disturbed": request.judged_as_disturbed,
             "control": dataclasses.asdict(request.settings),
             "scenario": dataclasses.asdict(request.scenario),
             "world": dataclasses.asdict(request.world),

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from fulcrum.sim.analysis.explain import Explanation, explain
+from fulcrum.sim.analysis.explain import explain
+from fulcrum.sim.analysis.explanation import Explanation
 from fulcrum.sim.model.grip import GripSchedule
 from fulcrum.sim.model.robot_model import RobotModel
 from fulcrum.sim.motion.ik import plan_joints

@@ -10,6 +10,10 @@ from fulcrum.sim.run.execute import Request, execute
 from fulcrum.sim.scenario.control import Control
 from fulcrum.sim.scenario.scenario import Scenario
 from fulcrum.sim.signals.progress import Progress
+from fulcrum.synthesis.render import Bullets, Page, page
+
+# How many of its failures a page tells.
+_TOLD = 3
 
 
 @dataclass(frozen=True)
@@ -42,6 +46,20 @@ class Trial:
     tilt_error_deg: float
     slip_mm: float
 
+    def page(self) -> Page:
+        """Return verdict, figures and the first failures as a page."""
+        return page(
+            (
+                f"{100 * self.share:.0f} % ({self.weight:.4g} N) in closed loop: ",
+                self.verdict.shown,
+                f"; {self.failed_syntheses} of {self.syntheses} syntheses without solution, torque "
+                f"at most {100 * self.torque_utilisation:.1f} % ({self.joint}), cut "
+                f"{100 * self.saturated_fraction:.1f} % of the time, tilt error "
+                f"{self.tilt_error_deg:.3f} deg, slip {self.slip_mm:.3f} mm",
+            ),
+            Bullets(self.failures[:_TOLD]),
+        )
+
 
 def confirm(
     scenario: Scenario,
@@ -72,7 +90,7 @@ def confirm(
         share=share,
         weight=weight,
         verdict=report.verdict,
-        failures=report.failures,
+        failures=report.sentences,
         failed_syntheses=report.synthesis.failures,
         syntheses=report.synthesis.solves,
         torque_utilisation=report.torque.max_utilisation,

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import Annotated
 
-from annotated_types import Ge, Le
+from annotated_types import Ge, Gt, Le
 
 from fulcrum.synthesis import InvalidInputError
-from fulcrum.synthesis.settings import Key, NotNegative, Positive, Settings
+from fulcrum.synthesis.settings import Key, Positive, Settings, Unlimited
 
 # A run's steps are to be counted, and kept.
 TimeStep = Annotated[float, Ge(1e-5), Le(1.0), Key("timestep_s")]
@@ -46,29 +47,83 @@ class Physics(Settings):
         super().__post_init__()
 
 
-@dataclass(frozen=True)
-class Tolerances(Settings):
-    """What counts as success."""
+# None, where it is infinite.
+Limit = Annotated[float, Gt(0), Unlimited]
+LimitOrZero = Annotated[float, Ge(0), Unlimited]
 
-    final_deg: Positive = 0.1
+
+@dataclass(frozen=True)
+class Judged(Settings):
+    """What a run is judged by; inf, or false, means that something is not judged."""
+
+    final_deg: Limit = 0.1
     """Deviation of the final tilt [deg]."""
 
-    error_deg: Positive = 0.2
+    error_deg: Limit = 0.2
     """Tilt error at any time [deg]."""
 
-    slip_mm: Positive = 0.1
-    """Drift of the touching points, and how far they slide [mm]."""
+    slip_mm: Limit = 0.1
+    """Drift of the points that touch [mm]; hands may never let go."""
 
-    spin_deg: Positive = 0.1
+    support_slip_mm: Limit | None = None
+    """The same of supports [mm]; slip_mm, if it is left out."""
+
+    slide_mm: Limit | None = None
+    """How far contacts slide in all [mm]; slip_mm, if it is left out."""
+
+    spin_deg: Limit = 0.1
     """Turn about the contact normal [deg]."""
 
-    utilisation: Positive = 0.95
+    utilisation: Limit = 0.95
     """Friction utilisation in the plant [-]; not of supports that hold the same point, which share
     it as they happen to."""
 
-    force_error: Positive = 0.02
+    force_error: Limit = 0.02
     """RMS of measured minus commanded normal force, over the peak commanded one [-]; of supports
     that hold the same point that of their force together."""
 
-    saturated_s: NotNegative = 0.0
+    saturated_s: LimitOrZero = 0.0
     """How long a torque may be cut at its limit at a stretch [s]."""
+
+    support_lost_s: LimitOrZero = 0.0
+    """How long a support may lose touch at a stretch [s]."""
+
+    impact: Limit = 1.0
+    """Normal force of a hand that comes or goes, over its largest grip [-]."""
+
+    collisions: bool = True
+    """Whether contacts that the scenario does not want are failures."""
+
+    no_forces: bool = True
+    """Whether it is a failure if the synthesis finds no forces."""
+
+    given_up: bool = True
+    """Whether it is a failure if the guard lowers the object or stops the run."""
+
+
+@dataclass(frozen=True)
+class Disturbed(Judged):
+    """What a run in a drawn world is judged by: the result, and what hands and motors bear."""
+
+    final_deg: Limit = 2.0
+    error_deg: Limit = math.inf
+    slip_mm: Limit = 5.0
+    support_slip_mm: Limit | None = 3.0
+    slide_mm: Limit | None = math.inf
+    spin_deg: Limit = math.inf
+    utilisation: Limit = math.inf
+    force_error: Limit = math.inf
+    saturated_s: LimitOrZero = 0.05
+    support_lost_s: LimitOrZero = math.inf
+    impact: Limit = math.inf
+    collisions: bool = False
+    no_forces: bool = False
+    given_up: bool = False
+
+
+@dataclass(frozen=True)
+class Tolerances(Judged):
+    """What counts as success; inf, or false, means that something is not judged."""
+
+    disturbed: Disturbed = Disturbed()
+    """The same for runs with --preset or --world, and for sweeps."""

@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 from typing import Annotated
 
 from fulcrum.sim.geometry.geom import Geom
-from fulcrum.sim.geometry.object import Object
+from fulcrum.sim.geometry.object import GRAVITY, Object
 from fulcrum.sim.scenario.contacts import Hand, Rest, Support
 from fulcrum.sim.scenario.control import Control
 from fulcrum.sim.scenario.path import Pivot, Poses
@@ -15,6 +15,8 @@ from fulcrum.sim.scenario.physics import Physics, Tolerances
 from fulcrum.sim.scenario.robot import Robot
 from fulcrum.synthesis import InvalidInputError
 from fulcrum.synthesis.arrays import Vector
+from fulcrum.synthesis.markdown import number, numbers
+from fulcrum.synthesis.render import Marked, Page, page, table, to_markdown
 from fulcrum.synthesis.settings import Key, Settings, check
 
 
@@ -110,10 +112,59 @@ class Scenario:
         """Standard deviation of every driven joint's start [rad or m], by its name in the scene."""
         return {r.prefix + joint: r.start_deviation for r in self.robots for joint in r.posture}
 
-    def _repr_markdown_(self) -> str:
-        from fulcrum.sim.run.notebook import scenario_markdown
+    def page(self) -> Page:
+        """Return object, robots, contacts, path and phases as a page."""
+        thing, path, robots = self.object, self.path, self.robots
+        contacts = [
+            (
+                hand.name,
+                f"hand on {hand.mount}",
+                number(hand.friction.mu),
+                number(hand.friction.e_n) if hand.friction.e_n is not None else "",
+                number(hand.f_n_max),
+                numbers(hand.p_OC_O, 3),
+            )
+            for hand in self.hands
+        ]
+        contacts += [
+            (
+                support.name,
+                f"support on {support.surface}",
+                number(support.friction.mu),
+                "",
+                "∞",
+                numbers(support.p_OP_O, 3),
+            )
+            for support in self.supports
+        ]
+        phases = [
+            (
+                phase.name,
+                number(phase.duration_s),
+                number(phase.tilt * path.angle_deg),
+                number(1e3 * phase.gap),
+                number(100.0 * phase.grip),
+            )
+            for phase in self.phases
+        ]
+        weight = f"{number(thing.mass)} kg ({number(thing.mass * GRAVITY)} N)"
+        return page(
+            (Marked(self.name), f": {self.summary}"),
+            f"Object {thing.name}: {weight}, centre of mass at ({numbers(thing.center_of_mass, 3)})"
+            f" m. Tilt by {number(path.angle_deg)} deg.",
+            table(
+                ("robot", "prefix of its names", "stands at [m]", "driven joints"),
+                [(r.model, r.prefix, numbers(r.base.position, 3), len(r.posture)) for r in robots],
+            ),
+            table(
+                ("contact", "what", "μ", "e_n [m]", "f_n at most [N]", "place on the object [m]"),
+                contacts,
+            ),
+            table(("phase", "takes [s]", "tilt [deg]", "gap [mm]", "grip [%]"), phases),
+        )
 
-        return scenario_markdown(self)
+    def _repr_markdown_(self) -> str:
+        return to_markdown(self.page())
 
 
 def lifted(scenario: Scenario) -> Scenario:

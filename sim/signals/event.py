@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from enum import Enum, IntEnum
+from enum import IntEnum, StrEnum
 from typing import NamedTuple
 
 
@@ -16,7 +16,7 @@ class Mode(IntEnum):
     STOP = 3
 
 
-class Cause(Enum):
+class Cause(StrEnum):
     """Why a run does not go on."""
 
     ENCODER = "encoder"
@@ -28,6 +28,16 @@ class Cause(Enum):
     SATURATION = "saturation"
     JOINT = "joint"
     TILT = "tilt"
+
+
+class Reaction(StrEnum):
+    """What the guard did."""
+
+    HOLD = "hold"
+    RUN = "run"
+    LOWER = "lower"
+    STOP = "stop"
+    END = "end"
 
 
 class Finding(NamedTuple):
@@ -43,10 +53,12 @@ class Event:
 
     Attributes:
         t: Time [s].
-        cause: What was found, in words.
-        reaction: hold, run, lower, stop or end.
+        cause: What was found; of ``run`` what has passed, of ``end`` why the object was lowered.
+        reaction: What was done.
+        text: What was found, in words.
     """
 
     t: float
-    cause: str
-    reaction: str
+    cause: Cause
+    reaction: Reaction
+    text: str

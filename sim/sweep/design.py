@@ -14,7 +14,6 @@ from fulcrum.sim.run.execute import PACKAGES
 from fulcrum.sim.run.files import finite
 from fulcrum.sim.scenario.control import controllers
 from fulcrum.sim.scenario.scenario import Scenario
-from fulcrum.sim.sweep.criteria import Criteria
 from fulcrum.sim.world.parameters import ParameterGrid, overridden
 from fulcrum.sim.world.presets import draw, preset
 from fulcrum.sim.world.world import World
@@ -49,7 +48,7 @@ class Episode:
 
 @dataclass(frozen=True)
 class Sweep:
-    """Every controller in every world.
+    """Every controller in every world; judged by the scenario's tolerances for disturbed runs.
 
     Attributes:
         scenario: The scene, as the controllers believe it to be.
@@ -58,7 +57,6 @@ class Sweep:
         episodes: Per controller and point of the grid.
         seed: Of the first; the next have the next.
         grid: What is set of the drawn worlds.
-        criteria: What counts as success.
         planning: How the tilt is planned, where the scenario is that of a planned tilt; else None.
         called: How command lines name the scenario; by its name if empty.
     """
@@ -69,7 +67,6 @@ class Sweep:
     episodes: int
     seed: int = 0
     grid: ParameterGrid = ()
-    criteria: Criteria = Criteria()
     planning: Planning | None = None
     called: str = ""
 
@@ -113,6 +110,8 @@ class Sweep:
         ]
         if self.planning is not None:
             words.append(self.planning.options)
+        if self.preset == "nominal" and not episode.values:
+            words.append("--disturbed")
         if episode.values:
             words.append("--world " + ",".join(f"{n}={v!r}" for n, v in episode.values))
         return " ".join(words)
@@ -129,7 +128,6 @@ class Sweep:
                 "episodes": self.episodes,
                 "seed": self.seed,
                 "grid": {name: list(values) for name, values in self.grid},
-                "criteria": dataclasses.asdict(self.criteria),
                 "planning": None if self.planning is None else dataclasses.asdict(self.planning),
                 "versions": {name: version(name) for name in PACKAGES},
             }

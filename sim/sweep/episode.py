@@ -9,19 +9,22 @@ from collections.abc import Mapping, Sequence
 from functools import lru_cache
 from typing import Any
 
+from fulcrum.sim.evaluation.outcome import Outcome
+from fulcrum.sim.evaluation.report import Verdict
 from fulcrum.sim.model.robot_model import RobotModel
 from fulcrum.sim.motion.ik import plan_joints
 from fulcrum.sim.planning.execution import planned_tilt
+from fulcrum.sim.plant.protocol import DivergedError
 from fulcrum.sim.run.execute import Request, Result, execute
 from fulcrum.sim.run.files import finite
 from fulcrum.sim.run.preparation import Preparation, prepare
 from fulcrum.sim.scenario.control import Control, controllers
 from fulcrum.sim.scenario.scenario import Scenario
 from fulcrum.sim.signals.trace import stretches
-from fulcrum.sim.sweep.criteria import violations
 from fulcrum.sim.sweep.design import Episode, Sweep
 from fulcrum.sim.world.parameters import PARAMETERS
 from fulcrum.sim.world.world import World
+from fulcrum.synthesis import FulcrumError
 
 Row = dict[str, Any]
 
@@ -108,6 +111,7 @@ def run_episode(packed: bytes, episode: Episode) -> Row:
         "cause": None,
         "category": None,
         "failed_at_s": None,
+        "outcome": None,
         "error": None,
         "replay": sweep.replay(episode),
         **_truths(world, sweep.scenario, shared.joints),
@@ -119,32 +123,40 @@ def run_episode(packed: bytes, episode: Episode) -> Row:
         episode.seed,
         world=world,
         planning=sweep.planning,
+        disturbed=True,
     )
     try:
         result = execute(request, prepared=shared.preparations[episode.controller])
     except Exception as error:  # whatever ends an episode is its failure, not the sweep's
         text = f"{type(error).__name__}: {error}"
         row |= {"cause": "error", "category": "error", "failed_at_s": 0.0, "error": text}
+        row["outcome"] = unstarted(error)
     else:
-        row |= outcome(shared, result)
+        row |= figures(shared, result)
     row["wall_s"] = time.perf_counter() - started
     row["cpu_s"] = time.thread_time() - computed
     return finite(row)
 
 
-def outcome(shared: Prepared, result: Result) -> Row:
-    """A run's figures, and whether it kept to the criteria."""
-    scenario, trace = shared.sweep.scenario, result.trace
+def unstarted(error: Exception) -> Outcome | None:
+    """Return the outcome of a run of which there is no step; None if that is a defect of ours."""
+    if isinstance(error, DivergedError):
+        return Outcome.DIVERGED
+    return Outcome.REFUSED if isinstance(error, FulcrumError) else None
+
+
+def figures(shared: Prepared, result: Result) -> Row:
+    """Return a run's figures, its verdict and what a failure began with."""
+    scenario, trace, found = shared.sweep.scenario, result.trace, result.report.failures
     report = dataclasses.asdict(result.report)
-    for whole_run in ("scenario", "controller", "seed", "recording", "phases"):
+    for whole_run in ("scenario", "controller", "seed", "disturbed", "recording", "phases"):
         report.pop(whole_run)
-    report["failures"] = " ".join(report["failures"])
-    found = violations(shared.sweep.criteria, scenario, shared.joints, result)
+    report["failures"] = " ".join(result.report.sentences)
     longest = [int(stretches(trace.saturated[:, i]).max()) for i in range(len(shared.joints))]
     worst = max(range(len(longest)), key=longest.__getitem__)
     return {
-        "success": not found,
-        "cause": found[0].text if found else None,
+        "success": result.report.verdict is Verdict.PASS,
+        "cause": found[0].cause if found else None,
         "category": found[0].category if found else None,
         "failed_at_s": found[0].t if found else None,
         "error": result.error,

@@ -17,6 +17,10 @@ from fulcrum.sim.sweep.episode import check_holdable, run_episode
 from fulcrum.sim.sweep.store import Store
 from fulcrum.sim.sweep.summary import Score, scores
 from fulcrum.synthesis import FulcrumError, InvalidInputError
+from fulcrum.synthesis.render import Lines, Marked, Page, page, table, to_markdown
+
+# How many causes of failures are named.
+_NAMED = 6
 
 # Called with episodes finished, episodes in total and failures so far.
 SweepProgress = Callable[[int, int, int], None]
@@ -34,7 +38,7 @@ class LostEpisodesError(FulcrumError):
 
 
 @dataclass(frozen=True, eq=False)
-class Outcome:
+class SweepResult:
     """What a sweep gave.
 
     Attributes:
@@ -45,15 +49,40 @@ class Outcome:
     rows: pa.Table
     scores: tuple[Score, ...]
 
-    def _repr_markdown_(self) -> str:
-        from fulcrum.sim.run.notebook import outcome_markdown
+    def page(self) -> Page:
+        """Return each controller's success rate, and what its failures began with, as a page."""
+        rows = [
+            (
+                score.controller,
+                f"{score.successes} of {score.episodes}",
+                f"{100.0 * score.rate:.1f} ({100.0 * score.low:.1f} to {100.0 * score.high:.1f})",
+                f"{score.grip_n:.1f}",
+                _named(score),
+            )
+            for score in self.scores
+        ]
+        head = ("controller", "episodes", "success (95 %) [%]", "grip [N]", "failures began with")
+        replays = [(s.controller, s.causes[0]) for s in self.scores if s.causes]
+        return page(
+            Marked("Sweep"),
+            table(head, rows),
+            Lines(tuple(f"{name}, {first.cause}: {first.replay}" for name, first in replays)),
+        )
 
-        return outcome_markdown(self)
+    def _repr_markdown_(self) -> str:
+        return to_markdown(self.page())
+
+
+def _named(score: Score) -> str:
+    """The most frequent causes of a controller's failures."""
+    named = ", ".join(f"{c.cause} ({c.episodes})" for c in score.causes[:_NAMED])
+    more = len(score.causes) - _NAMED
+    return (named or "none") + (f" and {more} more" if more > 0 else "")
 
 
 def run_sweep(
     sweep: Sweep, out: Path, workers: Workers = LOCAL, progress: SweepProgress | None = None
-) -> Outcome:
+) -> SweepResult:
     """Runs the episodes that are missing in a folder.
 
     Dask gives the episodes of a worker that dies to another one. What has been written survives
@@ -77,7 +106,7 @@ def run_sweep(
     if missing:
         _run(sweep, store, missing, workers, progress)
     rows = store.merge()
-    return Outcome(rows, scores(rows, tuple(hand.name for hand in sweep.scenario.hands)))
+    return SweepResult(rows, scores(rows, tuple(hand.name for hand in sweep.scenario.hands)))
 
 
 def _run(

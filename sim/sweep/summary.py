@@ -36,10 +36,9 @@ class Score:
     Attributes:
         controller: Name.
         episodes: How many there were.
-        successes: How many of them kept to all criteria.
+        successes: How many of them passed.
         rate: Their share [-].
         low, high: 95 % confidence interval of the rate (Clopper and Pearson 1934, exact) [-].
-        passes: How many kept to the scenario's own, stricter tolerances too.
         grip_n: Median over the episodes of the largest normal force of a hand [N].
         grip_max_n: The largest of all [N].
         causes: Of its failures, most frequent first.
@@ -51,7 +50,6 @@ class Score:
     rate: float
     low: float
     high: float
-    passes: int
     grip_n: float
     grip_max_n: float
     causes: tuple[FailureCause, ...]
@@ -90,7 +88,6 @@ def _score(name: str, rows: list[dict], hands: tuple[str, ...]) -> Score:
         rate=successes / len(rows),
         low=float(interval.low),
         high=float(interval.high),
-        passes=sum(row.get("verdict") == "pass" for row in rows),
         grip_n=float(np.median(grips)) if grips else 0.0,
         grip_max_n=max(grips, default=0.0),
         causes=tuple(

@@ -11,6 +11,7 @@ from fulcrum.sim.geometry.geom import Geom
 from fulcrum.sim.geometry.pose import Pose
 from fulcrum.sim.model.robot_model import RobotModel
 from fulcrum.sim.run.execute import Request, Result, execute
+from fulcrum.sim.run.preparation import prepare
 from fulcrum.sim.scenario.phases import stretched
 from fulcrum.sim.scenario.scenario import Scenario
 from fulcrum.sim.world.faults import Fault, FaultKind
@@ -142,9 +143,9 @@ def faulty_run(name, guarded=True):
     world, _, _, _, scene = CASES[name]
     control = scene.control if guarded else replace(scene.control, guard=UNGUARDED)
     out = Path(tempfile.mkdtemp()) / "run" if guarded else None
-    best_effort = scene is TOO_FAR
-    request = Request(scene, "margin", control, world=world, out=out, best_effort=best_effort)
-    return Faulty(execute(request), None if out is None else out / "run.rrd")
+    request = Request(scene, "margin", control, world=world, out=out, disturbed=False)
+    prepared = prepare(scene, control, check=scene is not TOO_FAR)
+    return Faulty(execute(request, prepared=prepared), None if out is None else out / "run.rrd")
 
 
 class Faulty(NamedTuple):

@@ -41,10 +41,10 @@ def short_run():
     return execute(Request(SCENARIO, "margin", SCENARIO.control))
 
 
-def judge_of(scene):
+def judge_of(scene, disturbed=False):
     """The judge of a scenario."""
     robot = RobotModel(scene)
-    return Judge(scene, robot.joints, robot.tau_min, robot.tau_max)
+    return Judge(scene, robot.joints, robot.tau_min, robot.tau_max, disturbed)
 
 
 def changed(record, field, index, value):

@@ -16,7 +16,7 @@ from fulcrum.scenarios.schema.writer import write
 from fulcrum.sim.scenario.contacts import Friction
 from fulcrum.sim.scenario.control import Control, Guard, Robustness
 from fulcrum.sim.scenario.phases import Phase
-from fulcrum.sim.scenario.physics import Physics, Tolerances
+from fulcrum.sim.scenario.physics import Disturbed, Physics, Tolerances
 from fulcrum.sim.scenario.scenario import View
 from fulcrum.synthesis import FulcrumError, Objective
 from fulcrum.synthesis.robust.uncertainty_set import UncertaintySet
@@ -30,6 +30,10 @@ def other(value):
         return not value
     if isinstance(value, Objective):
         return Objective.MAX_TORQUE
+    if value is None:
+        return 0.125
+    if value == math.inf:
+        return 0.25
     if isinstance(value, list):
         return [other(item) for item in value]
     return value + 1 if isinstance(value, int) else 0.5 * value or 0.125
@@ -62,8 +66,10 @@ def test_every_setting_has_its_key():
     assert own.robustness is not None
     assert same(own.robustness, Robustness(UncertaintySet(), preload=0.0)) == set()
     assert same(own.robustness.uncertainty, UncertaintySet()) == set()
-    for settings in (Physics, Tolerances, View):
+    for settings in (Physics, View, Disturbed):
         assert same(read_as(settings, changed(settings)), settings()) == set()
+    own = read_as(Tolerances, changed(Tolerances, disturbed=changed(Disturbed)))
+    assert same(own, Tolerances()) == set()
     assert read_as(Friction, {"mu": 0.5, "torsion_m": 0.01}) == Friction(0.5, e_n=0.01)
 
 

@@ -86,7 +86,7 @@ def test_three_and_a_half_seconds_are_too_fast_for_quasi_static_forces():
     gone = {names[i] for i in np.flatnonzero(~history.kept[lost].all(axis=0))}
     assert gone == {"edge_left", "edge_right"}
     assert 10.0 < np.degrees(trace.tilt[lost[0]]) < 30.0
-    assert any(re.match(r"Contact edge_\w+ let go at", f) for f in report.failures)
+    assert any(re.match(r"Contact edge_\w+ let go at", f) for f in report.sentences)
     assert abs(report.tilt.final_deg - 90.0) <= 0.1
     assert report.tilt.max_error_deg <= 0.2
 
@@ -109,6 +109,6 @@ def test_the_box_stands_at_the_end():
 def test_a_box_that_is_let_go_where_it_cannot_stand_is_caught():
     report, trace, _ = run(BOX, "half way")
     assert report.verdict is Verdict.FAIL
-    assert any(f.startswith("The tilt ended at") for f in report.failures)
+    assert any(f.startswith("The tilt ended at") for f in report.sentences)
     # It falls back on its broad face.
     assert abs(np.degrees(trace.tilt[-1])) < 1.0

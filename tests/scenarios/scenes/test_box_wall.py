@@ -63,7 +63,7 @@ def test_the_box_ends_past_its_balance_with_its_face_on_the_wall():
 
 def test_supports_at_one_place_are_judged_by_the_force_there():
     outcome = run("box-wall", "default")
-    assert outcome.report.verdict is Verdict.PASS, outcome.report.failures
+    assert outcome.report.verdict is Verdict.PASS, outcome.report.sentences
     contacts, limits = outcome.report.contacts, WALL.tolerances
     # Alone the foot is far from its commanded force, and its friction is used up.
     peak = outcome.trace.w_commanded_C[:, FOOT_LEFT, N].max()
@@ -73,5 +73,5 @@ def test_supports_at_one_place_are_judged_by_the_force_there():
     less = outcome.history.w_measured_C.copy()
     less[:, FOOT_LEFT, :3] *= 0.7
     history = replace(outcome.history, w_measured_C=less)
-    (failure,) = judge_of(WALL).report(INFO, outcome.trace, history).failures
+    (failure,) = judge_of(WALL).report(INFO, outcome.trace, history).sentences
     assert failure.startswith("Contacts foot_left and wall_left together followed")

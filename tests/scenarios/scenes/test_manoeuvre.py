@@ -72,7 +72,7 @@ def test_hands_touch_and_leave_with_less_than_their_grip(name):
 def test_nothing_touches_against_the_scenario_s_will(name):
     report, trace, _ = run(name, "default")
     assert not trace.collisions.any()
-    assert not [f for f in report.failures if "touched" in f]
+    assert not [f for f in report.sentences if "touched" in f]
 
 
 @pytest.mark.parametrize("name", LEAVING)
@@ -108,7 +108,7 @@ def test_a_hand_that_hits_too_hard_is_caught():
     peak = trace.w_commanded_C[:, :2, N].max(axis=0)
     assert (forces.max(axis=0) > peak).all()
     assert report.verdict is Verdict.FAIL
-    told = [f for f in report.failures if "hit the object with" in f]
+    told = [f for f in report.sentences if "hit the object with" in f]
     assert [f.split()[1] for f in sorted(told)] == ["left", "right"]
     assert f"{forces[:, 0].max():.3g} N" in sorted(told)[0]
 
@@ -116,13 +116,13 @@ def test_a_hand_that_hits_too_hard_is_caught():
 def test_a_hand_that_still_touches_at_the_end_is_caught():
     report = run(BOX, "clinging").report
     assert report.verdict is Verdict.FAIL
-    assert [f for f in report.failures if "touched the object at" in f and "stand alone" in f]
-    assert len(report.failures) <= 2
+    assert [f for f in report.sentences if "touched the object at" in f and "stand alone" in f]
+    assert len(report.sentences) <= 2
 
 
 def test_hands_that_withdraw_without_having_tilted_pass():
     report, trace, _ = run(BOX, "leaving")
-    assert report.verdict is Verdict.PASS, report.failures
+    assert report.verdict is Verdict.PASS, report.sentences
     assert report.tilt.target_deg == 0.0
     assert np.abs(np.degrees(trace.tilt)).max() < 0.1
 
@@ -131,7 +131,7 @@ def test_an_obstacle_that_the_belief_does_not_know_is_told_with_both_names_and_t
     report, trace, _ = run(BOX, "blocked")
     assert report.verdict is Verdict.FAIL
     first = float(trace.t[np.flatnonzero(trace.collisions)[0]])
-    told = [f for f in report.failures if "touched" in f]
+    told = [f for f in report.sentences if "touched" in f]
     assert "post" in told[0]
     assert "left_" in told[0]
     assert told[0].endswith(f"at {first:.2f} s.")

@@ -24,8 +24,8 @@ from tests.helpers.runs import BOX, FAILING, NAMES, THOROUGH, run, settled, viol
 @pytest.mark.parametrize("name", NAMES)
 def test_the_default_controller_passes(name):
     report = run(name, "default").report
-    assert report.verdict is Verdict.PASS, report.failures
-    assert report.failures == ()
+    assert report.verdict is Verdict.PASS, report.sentences
+    assert report.sentences == ()
 
 
 @pytest.mark.parametrize("name", NAMES)
@@ -93,7 +93,7 @@ def first_row(name, outcome, contact, what):
 @pytest.mark.parametrize(("name", "case"), [pair for pair in FAILING if pair[1] != "slippery"])
 def test_the_report_names_the_contact_that_slipped_or_let_go_with_time_and_tilt(name, case):
     outcome = run(name, case)
-    told = [match for f in outcome.report.failures if (match := SENTENCE.match(f))]
+    told = [match for f in outcome.report.sentences if (match := SENTENCE.match(f))]
     hands = {hand.name for hand in scenario(name).hands}
     assert hands & {match["contact"] for match in told}
     for match in told:

@@ -12,13 +12,13 @@ from fulcrum.sim.evaluation.report import Verdict
 from fulcrum.sim.model.robot_model import RobotModel
 from fulcrum.sim.motion.schedule import Schedule
 from fulcrum.sim.run.assembly import closed_loop
-from fulcrum.sim.run.notebook import report_markdown
 from fulcrum.sim.scenario.control import Guard
 from fulcrum.sim.signals.event import Mode
 from fulcrum.sim.world.faults import Fault, FaultKind
 from fulcrum.sim.world.presets import draw, preset
 from fulcrum.sim.world.world import World
 from fulcrum.synthesis import InvalidInputError
+from fulcrum.synthesis.render import to_markdown
 from tests.helpers.faulty_runs import CASES, TILT, UNGUARDED_TOO, faulty_run
 from tests.helpers.recordings import NANOSECOND, Content
 
@@ -64,14 +64,14 @@ def test_the_report_names_cause_time_and_reaction(name):
     _, cause, reactions, (earliest, latest), _ = CASES[name]
     report = faulty_run(name).result.report
     assert tuple(event.reaction for event in report.events) == reactions
-    assert any(cause in event.cause for event in report.events)
+    assert any(cause in event.text for event in report.events)
     assert earliest <= report.events[0].t <= latest
     times = [event.t for event in report.events]
     assert times == sorted(times)
-    text = report_markdown(report)
+    text = to_markdown(report.page())
     for event in report.events:
-        assert f"| {event.t:.3f} | {event.cause} | {event.reaction} |" in text
-    given_up = [f for f in report.failures if f.startswith("The run was ")]
+        assert f"| {event.t:.3f} | {event.text} | {event.reaction} |" in text
+    given_up = [f for f in report.sentences if f.startswith("The run was ")]
     assert len(given_up) == len({"lower", "stop"} & set(reactions))
     if given_up:
         assert report.verdict is Verdict.FAIL
@@ -123,7 +123,7 @@ def test_the_recording_is_complete_to_the_last_step(name):
         times, _ = content.series(entity, "Scalars:scalars")
         assert len(times) == len(trace)
         assert times[-1] == pytest.approx(trace.t[-1], abs=2 * NANOSECOND)
-    assert content.text("verdict") == report_markdown(result.report)
+    assert content.text("verdict") == to_markdown(result.report.page())
     shown = [state for _, state in content.states("phase")]
     for reaction in {e.reaction for e in result.report.events} & {"hold", "lower", "stop"}:
         assert any(state.startswith(f"{reaction.upper()}: ") for state in shown)
@@ -161,7 +161,7 @@ def test_a_harsh_world_in_which_the_grip_suffices_trips_nothing(seed):
     firm = replace(box.control, friction_factor=0.6, preload=14.0)
     loop = closed_loop(box, firm, seed=seed, world=draw(preset("harsh"), box, seed))
     for _ in loop.run():
-        assert loop.events == ()
+        assert loop.controller.events == ()
     assert np.degrees(loop.trace.tilt[-1]) > 89.0
 
 

@@ -27,8 +27,8 @@ from tests.helpers.short_run import (
 )
 
 REPORT_KEYS = {
-    "": "scenario controller objective seed verdict failures events phases tilt contacts torque"
-    " synthesis timing recording",
+    "": "scenario controller objective seed disturbed verdict outcome failures events phases tilt"
+    " contacts torque synthesis timing recording",
     "tilt": "target_deg final_deg rms_error_deg max_error_deg",
     "contacts": "left right edge_left edge_right",
     "contacts.left": "kept_fraction slip_mm slide_mm spin_deg max_utilisation max_normal_n"
@@ -122,7 +122,7 @@ def numbers(value):
 def test_the_run_passes_before_it_is_tampered_with(judge, run):
     report = judge.report(INFO, run.trace, run.history)
     assert report.verdict is Verdict.PASS
-    assert report.failures == ()
+    assert report.sentences == ()
 
 
 @pytest.mark.parametrize("tamper", SENTENCES, ids=lambda t: t.__name__)
@@ -130,12 +130,12 @@ def test_exactly_the_failure_is_told(judge, run, tamper):
     trace, history = tamper(run.trace, run.history)
     report = judge.report(INFO, trace, history)
     assert report.verdict is Verdict.FAIL
-    assert report.failures == (SENTENCES[tamper].format(when=when(trace, ROW)),)
+    assert report.sentences == (SENTENCES[tamper].format(when=when(trace, ROW)),)
 
 
 def test_a_normal_force_off_its_command_is_told_with_both_numbers(judge, run):
     trace, history = followed_badly(run.trace, run.history)
-    (sentence,) = judge.report(INFO, trace, history).failures
+    (sentence,) = judge.report(INFO, trace, history).sentences
     settled = trace.t > 0.5995
     error = (history.w_measured_C[:, LEFT, N] - trace.w_commanded_C[:, LEFT, N])[settled]
     allowed = LIMITS.force_error * trace.w_commanded_C[:, LEFT, N].max()
@@ -164,7 +164,7 @@ def test_while_grip_is_built_up_contacts_are_not_held_to_account(judge, run):
 
 def test_torques_are_held_to_account_while_grip_is_built_up(judge, run):
     trace = changed(run.trace, "saturated", (GRIP_ROW, 0), 1.0)
-    (sentence,) = judge.report(INFO, trace, run.history).failures
+    (sentence,) = judge.report(INFO, trace, run.history).sentences
     assert sentence.endswith("at 0.40 s (tilt 0.0 deg).")
 
 
@@ -175,7 +175,7 @@ def test_sentences_stand_in_the_order_of_time(judge, run):
         trace = changed(run.trace, "saturated", (cut_row, 0), 1.0)
         return [
             next(word for word in ("slipped", "cut", "let go") if word in sentence)
-            for sentence in judge.report(INFO, trace, history).failures
+            for sentence in judge.report(INFO, trace, history).sentences
         ]
 
     assert told(600, 1200, 1800) == ["slipped", "cut", "let go"]
@@ -186,11 +186,11 @@ def test_what_a_contact_does_after_it_has_let_go_is_no_news(judge, run):
     history = changed(run.history, "kept", (slice(ROW, None), LEFT), False)
     history = changed(history, "slip", (slice(ROW + 100, None), LEFT), 1.0)
     history = changed(history, "utilisation", (slice(ROW + 100, None), LEFT), 1.0)
-    (sentence,) = judge.report(INFO, run.trace, history).failures
+    (sentence,) = judge.report(INFO, run.trace, history).sentences
     assert sentence.startswith("Contact left let go")
     # Before it, it is.
     history = changed(history, "slip", (slice(ROW - 100, None), LEFT), 1.0)
-    assert "slipped" in judge.report(INFO, run.trace, history).failures[0]
+    assert "slipped" in judge.report(INFO, run.trace, history).sentences[0]
 
 
 def test_an_interrupted_run_is_neither_pass_nor_fail(judge, run):
@@ -198,7 +198,7 @@ def test_an_interrupted_run_is_neither_pass_nor_fail(judge, run):
     history = replace(history, **{name: a[:1000] for name, a in vars(history).items()})
     report = judge.report(replace(INFO, interrupted=True), trace, history)
     assert report.verdict is Verdict.INTERRUPTED
-    assert report.failures == ("The run was interrupted at 1.00 s.",)
+    assert report.sentences == ("The run was interrupted at 1.00 s.",)
     assert judge.report(INFO, trace, history).verdict is Verdict.FAIL
 
 
@@ -206,7 +206,7 @@ def test_an_error_that_ended_the_run_fails_it(judge, run):
     error = "The simulation diverged at 2499 steps: mjWARN_BADQACC."
     report = judge.report(replace(INFO, error=error), run.trace, run.history)
     assert report.verdict is Verdict.FAIL
-    assert report.failures == (error,)
+    assert report.sentences == (error,)
 
 
 @pytest.mark.parametrize("steps", [1, 100, 700, 2700])

@@ -6,9 +6,9 @@ from dataclasses import replace
 import pytest
 
 from fulcrum.sim.evaluation.report import Verdict
-from fulcrum.sim.run.notebook import report_markdown
 from fulcrum.sim.scenario.phases import Phase
 from fulcrum.synthesis.arrays import N
+from fulcrum.synthesis.render import to_markdown
 from tests.helpers.short_run import (
     EDGE_LEFT,
     INFO,
@@ -63,7 +63,7 @@ def test_a_contact_that_comes_back_does_not_count_again(judge, run):
     history = changed(history, "slip", (slice(ROW + 1, None), LEFT), 1.0)
     report = judge.report(INFO, run.trace, history)
     assert report.contacts["left"].slip_mm < LIMITS.slip_mm
-    (sentence,) = report.failures
+    (sentence,) = report.sentences
     assert "let go" in sentence
 
 
@@ -78,18 +78,18 @@ def test_a_single_lost_step_is_not_printed_as_all(judge, run):
     report = judge.report(INFO, trace, history)
     assert report.contacts["edge_left"].kept_percent == 99.9
     assert report.contacts["left"].kept_percent == 100.0
-    assert "| edge_left | 99.9 |" in report_markdown(report)
-    assert "| left | 100.0 |" in report_markdown(report)
+    assert "| edge_left | 99.9 |" in to_markdown(report.page())
+    assert "| left | 100.0 |" in to_markdown(report.page())
 
 
 @pytest.mark.parametrize("final", [-1e-6, 1e-6])
 def test_no_tilt_is_printed_as_minus_nothing(judge, run, final):
     report = judge.report(INFO, changed(run.trace, "tilt", LAST, final), run.history)
-    assert any("ended at 0.00 deg instead of 10" in f for f in report.failures)
-    assert "\nTilt 0.00 of 10 deg" in report_markdown(report)
+    assert any("ended at 0.00 deg instead of 10" in f for f in report.sentences)
+    assert "\nTilt 0.00 of 10 deg" in to_markdown(report.page())
     # A tilt that is seen is.
     report = judge.report(INFO, changed(run.trace, "tilt", LAST, -0.01), run.history)
-    assert any("ended at -0.57 deg instead of 10" in f for f in report.failures)
+    assert any("ended at -0.57 deg instead of 10" in f for f in report.sentences)
 
 
 # --- hands that come and go ---
@@ -98,7 +98,7 @@ def test_no_tilt_is_printed_as_minus_nothing(judge, run, final):
 def test_a_hand_that_hits_with_more_than_its_grip_is_told(judge, run):
     peak = run.trace.w_commanded_C[:, LEFT, N].max()
     history = changed(run.history, "w_measured_C", (TOUCH_ROW, LEFT, N), 1.001 * peak)
-    (sentence,) = judge.report(INFO, run.trace, history).failures
+    (sentence,) = judge.report(INFO, run.trace, history).sentences
     assert sentence == (
         f"Hand left hit the object with {1.001 * peak:.3g} N at {when(run.trace, TOUCH_ROW)}, "
         f"more than its largest grip of {peak:.3g} N."
@@ -116,18 +116,18 @@ def test_a_hand_that_touches_when_the_object_should_stand_alone_is_told(run, gap
     scene = replace(SCENARIO, phases=(*PHASES[:3], replace(stand, name="let go", gap=0.0), stand))
     alone = judge_of(scene)
     trace = changed(run.trace, "phase", slice(2650, None), 4)
-    found = alone.report(INFO, trace, run.history).failures
+    found = alone.report(INFO, trace, run.history).sentences
     told = [f for f in found if "stand alone" in f]
     assert len(told) == (2 if gap else 0)
     if gap:
         expected = f"Hand left touched the object at {when(trace, 2650)}, when it should stand"
         assert told[0].startswith(expected)
         gone = changed(run.history, "w_measured_C", (slice(2650, None), slice(0, 2), N), 0.0)
-        assert not [f for f in alone.report(INFO, trace, gone).failures if "stand alone" in f]
+        assert not [f for f in alone.report(INFO, trace, gone).sentences if "stand alone" in f]
 
 
 def test_geoms_that_touched_are_told_with_the_time(judge, run):
     info = replace(INFO, collisions={("left_wrist", "post"): 1.2345})
     report = judge.report(info, run.trace, run.history)
     assert report.verdict is Verdict.FAIL
-    assert report.failures == ("left_wrist touched post at 1.23 s.",)
+    assert report.sentences == ("left_wrist touched post at 1.23 s.",)

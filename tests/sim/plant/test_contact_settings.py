@@ -68,7 +68,7 @@ def by_role(name, outcome):
 @pytest.mark.parametrize("name", NAMES)
 def test_other_contact_settings_give_the_same_verdict_and_rms_forces(name, case):
     default, other = run(name, "default"), run(name, case)
-    assert other.report.verdict is default.report.verdict is Verdict.PASS, other.report.failures
+    assert other.report.verdict is default.report.verdict is Verdict.PASS, other.report.sentences
     shift, _ = force_shift(name, default, other)
     # As long as there is grip, while it grows and is let go included.
     rows = gripped(name, default.trace)[: len(shift)]

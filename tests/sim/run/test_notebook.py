@@ -13,9 +13,10 @@ from hypothesis import strategies as st
 from markdown_it import MarkdownIt
 
 from fulcrum.scenarios import scenarios
+from fulcrum.sim.evaluation.failure import Category, Failure
 from fulcrum.sim.run.execute import Request, Result, execute
 from fulcrum.sim.scenario.phases import Phase
-from fulcrum.sim.sweep.farm import Outcome
+from fulcrum.sim.sweep.farm import SweepResult
 from fulcrum.sim.sweep.summary import FailureCause, Score
 from fulcrum.synthesis import InfeasibleError, InvalidInputError, Objective, Synthesizer
 from fulcrum.synthesis.markdown import escaped, number, table
@@ -153,7 +154,8 @@ def test_a_run_shows_verdict_contacts_and_units():
 
 def test_a_run_that_went_wrong_shows_why():
     result = short_run()
-    failed = replace(result.report, failures=("The <left> let go.",))
+    failure = Failure(1.0, Category.LOST, "<left>", "The <left> let go.")
+    failed = replace(result.report, failures=(failure,))
     text = shown(Result(failed, result.trace, result.history, "It diverged."))
     assert "- The &lt;left&gt; let go." in text
     assert "Ended by: It diverged." in text
@@ -174,13 +176,13 @@ def test_a_plan_shows_duration_and_limits():
 
 def test_a_sweep_shows_rates_and_causes():
     cause = FailureCause("slip of left", 3, 0.3, "fulcrum run x")
-    score = Score("margin", 10, 7, 0.7, 0.348, 0.933, 6, 34.1, 36.0, (cause,))
-    text = shown(Outcome(pa.table({}), (score,)))
+    score = Score("margin", 10, 7, 0.7, 0.348, 0.933, 34.1, 36.0, (cause,))
+    text = shown(SweepResult(pa.table({}), (score,)))
     found = cells(text)
     assert "70.0 (34.8 to 93.3)" in found
     assert "slip of left (3)" in found
     assert {"success (95 %) [%]", "grip [N]"} <= set(found)
-    assert cells(shown(Outcome(pa.table({}), ()))) == []
+    assert cells(shown(SweepResult(pa.table({}), ()))) == []
 
 
 # --- what a request needs to be told ---

@@ -313,7 +313,7 @@ def test_a_run_off_the_main_thread_runs():
     with ThreadPoolExecutor(1) as pool:
         report = pool.submit(execute, Request(short, "margin", short.control)).result().report
     # A 5 s tilt slides by 0.12 mm: it ran, and was judged.
-    assert any("slid" in failure for failure in report.failures)
+    assert any("slid" in failure for failure in report.sentences)
 
 
 def test_time_between_actions_must_be_whole_steps():

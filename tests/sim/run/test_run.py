@@ -11,16 +11,19 @@ import pytest
 
 from fulcrum.scenarios import scenario
 from fulcrum.scenarios.cli import main
+from fulcrum.sim.evaluation.failure import Category, Failure
+from fulcrum.sim.evaluation.outcome import Outcome
 from fulcrum.sim.evaluation.report import Verdict
 from fulcrum.sim.motion.joint_path import PathError
 from fulcrum.sim.plant.mujoco import MujocoPlant
 from fulcrum.sim.plant.protocol import DivergedError
 from fulcrum.sim.run.assembly import closed_loop
 from fulcrum.sim.run.execute import Request, execute, resolved_config
-from fulcrum.sim.run.notebook import report_markdown
 from fulcrum.sim.scenario.phases import stretched
+from fulcrum.synthesis.render import to_markdown
 from tests.helpers.short_run import short_tilt
 
+LET_GO = Failure(1.0, Category.LOST, "left", "Contact left let go.")
 BLOCK = 250  # steps that the loop hands over at a time
 # It passes: 1.9 s of simulated time.
 SCENARIO = short_tilt(5.0, 1.2)
@@ -115,8 +118,8 @@ def test_progress_counts_up_to_all_steps(result, progress):
 
 
 def test_the_text_of_the_verdict_holds_verdict_contacts_and_failures(result):
-    report = replace(result.report, verdict=Verdict.FAIL, failures=("Contact left let go.",))
-    text = report_markdown(report)
+    report = replace(result.report, verdict=Verdict.FAIL, failures=(LET_GO,))
+    text = to_markdown(report.page())
     assert text.startswith("# box-tilt: FAIL\n")
     assert "- Contact left let go." in text
     for name, contact in report.contacts.items():
@@ -149,11 +152,12 @@ def test_a_signal_ends_the_run_after_the_present_block_with_a_complete_record(tm
 
     interrupted = execute(request(out=tmp_path), stop)
     assert interrupted.report.verdict is Verdict.INTERRUPTED
+    assert interrupted.report.outcome is Outcome.INTERRUPTED
     # The signal arrives at once, or while the block that follows is made.
     steps = len(interrupted.trace)
     assert steps in (2 * BLOCK, 3 * BLOCK)
     when = f"{1e-3 * steps:.2f} s"
-    assert interrupted.report.failures == (f"The run was interrupted at {when}.",)
+    assert interrupted.report.sentences == (f"The run was interrupted at {when}.",)
     assert strict_json(tmp_path / "report.json")["verdict"] == "interrupted"
     # Ctrl-C works as before once the run is over.
     assert [signal.getsignal(n) for n in (signal.SIGINT, signal.SIGTERM)] == before
@@ -181,7 +185,12 @@ def test_a_diverged_run_keeps_every_step_before_and_says_when(monkeypatch, tmp_p
     diverged = execute(request(seed=4, out=tmp_path))
     report = diverged.report
     assert report.verdict is Verdict.FAIL
-    assert report.failures[-1] == (
+    # It stands before the tilt that was not reached because of it.
+    (error,) = [failure for failure in report.failures if failure.category == "error"]
+    later = report.failures[report.failures.index(error) + 1 :]
+    assert {failure.category for failure in later} <= {"tilt"}
+    assert report.outcome is Outcome.DIVERGED
+    assert error.text == (
         f"the simulation diverged at {1e-3 * step:.3f} s; check the scenario's physics."
     )
     # The blocks before, and of the last one what had been done.

@@ -3,6 +3,7 @@
 import json
 import math
 import os
+import pickle
 import shlex
 import signal
 import subprocess
@@ -19,8 +20,11 @@ from distributed import LocalCluster
 
 from fulcrum.scenarios import scenarios
 from fulcrum.scenarios.cli import main
+from fulcrum.sim.motion.joint_path import PathError
+from fulcrum.sim.plant.protocol import DivergedError
 from fulcrum.sim.run.workers import Workers
 from fulcrum.sim.sweep.design import Sweep
+from fulcrum.sim.sweep.episode import run_episode
 from fulcrum.sim.sweep.farm import LostEpisodesError, run_sweep
 from fulcrum.sim.sweep.store import Store
 from fulcrum.sim.world.world import World
@@ -245,11 +249,79 @@ def test_the_command_of_a_row_replays_it_bit_for_bit(story, tmp_path, monkeypatc
     compared = {n: v for n, v in report.items() if n in row and n not in TIMES and n != "failures"}
     assert len(compared) > 40
     assert compared == {name: row[name] for name in compared}
-    assert " ".join(report["failures"]) == row["failures"]
-    assert row["cause"] in capsys.readouterr().out
+    assert " ".join(failure["text"] for failure in report["failures"]) == row["failures"]
+    assert report["failures"][0]["text"] in capsys.readouterr().out
     # Another seed is another run.
     other = next(r for r in rows if r["seed"] != row["seed"])
     assert compared != {name: other[name] for name in compared}
+
+
+def verdict_of(row, folder):
+    """Exit code of a row's replay, and its report."""
+    code = main([*shlex.split(row["replay"])[1:], "--out", str(folder)])
+    return code, json.loads((folder / "report.json").read_text())
+
+
+def same_verdict(row, code, report):
+    """Whether a replay has the verdict, causes and exit code of its episode."""
+    failures = report["failures"]
+    first = failures[0] if failures else {"t": None, "category": None, "subject": ""}
+    cause = f"{first['category']} {first['subject']}".strip() if failures else None
+    return (
+        code == (0 if row["success"] else 1)
+        and (report["verdict"] == "pass") is row["success"]
+        and report["outcome"] == row["outcome"]
+        and (cause, first["category"], first["t"])
+        == (row["cause"], row["category"], row["failed_at_s"])
+        and " ".join(failure["text"] for failure in failures) == row["failures"]
+    )
+
+
+def test_every_replay_has_the_verdict_causes_and_exit_code_of_its_row(
+    story, tmp_path, monkeypatch, capsys
+):
+    monkeypatch.setitem(scenarios(), SCENE.name, SCENE)
+    assert {row["success"] for row in story.rows} == {True, False}
+    for row in story.rows:
+        folder = tmp_path / f"{row['episode']}-{row['controller']}"
+        code, report = verdict_of(row, folder)
+        assert same_verdict(row, code, report), row["replay"]
+        # One verdict is printed, and it is that one.
+        output = capsys.readouterr().out
+        assert (f"{SCENE.name}: PASS" in output) is row["success"]
+        assert (f"{SCENE.name}: FAIL" in output) is not row["success"]
+        assert "success" not in output
+        assert not same_verdict(row, 1 - code, report)
+
+
+def test_an_episode_of_worlds_as_believed_is_replayed_with_a_sweep_s_tolerances(
+    tmp_path, monkeypatch, capsys
+):
+    sweep = short_sweep(preset="nominal", controllers=("paper",), episodes=1)
+    (episode,) = sweep.all_episodes()
+    row = run_episode(pickle.dumps(sweep), episode)
+    monkeypatch.setitem(scenarios(), SCENE.name, SCENE)
+    assert same_verdict(row, *verdict_of(row, tmp_path / "replay"))
+    # Without the option it is held to the scenario's own.
+    strict = {**row, "replay": row["replay"].replace(" --disturbed", "")}
+    assert not same_verdict(row, *verdict_of(strict, tmp_path / "strict"))
+
+
+def test_what_is_refused_says_so_in_its_row(monkeypatch):
+    sweep = short_sweep(controllers=("margin",), episodes=1)
+    (episode,) = sweep.all_episodes()
+    for error, found in (
+        (PathError(0.1, 0.0, 0.01, ["out of reach"]), "refused"),
+        (DivergedError(0.0), "diverged"),
+        (ZeroDivisionError(), None),
+    ):
+
+        def fail(*_, error=error, **__):
+            raise error
+
+        monkeypatch.setattr("fulcrum.sim.sweep.episode.execute", fail)
+        row = run_episode(pickle.dumps(sweep), episode)
+        assert (row["outcome"], row["success"], row["cause"]) == (found, False, "error")
 
 
 class Deadly(Sweep):

@@ -149,7 +149,7 @@ def test_scores_count_successes_and_rank_causes():
     ]
     assert margin.causes[0].replay == "fulcrum run --seed 8"
     assert (margin.grip_n, margin.grip_max_n) == (51.0, 51.0)
-    assert (paper.rate, paper.low, paper.passes, paper.grip_n) == (0.0, 0.0, 0, 0.0)
+    assert (paper.rate, paper.low, paper.grip_n) == (0.0, 0.0, 0.0)
 
 
 def test_the_map_is_green_where_episodes_succeed_and_red_where_not(tmp_path):
@@ -224,6 +224,7 @@ BAD = {
     "sweep box-tilt --episodes 1 --workers 2 --scheduler tcp://a:1": "--workers",
     "sweep box-tilt --episodes 1 --scheduler nowhere://at-all": "--scheduler",
     "sweep box-tilt --episodes 1 --seed -1": "seed",
+    "sweep box-tilt --episodes 1 --require 101": "--require",
     "sweep box-tilt --episodes 1 --out file": "--out",
     "sweep box-lift --episodes 1 --controllers margin": "cannot be held",
     "run box-tilt --preset moon": "nominal, lab, field, harsh",

@@ -1,0 +1,243 @@
+"""The checks of a run: its tolerances against trace and contact history."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from fulcrum.sim.evaluation.failure import Category, Failure
+from fulcrum.sim.evaluation.monitor import ContactHistory
+from fulcrum.sim.evaluation.report import ContactReport, RunInfo, TiltReport
+from fulcrum.sim.model.contacts import shared_places
+from fulcrum.sim.motion.schedule import Schedule
+from fulcrum.sim.scenario.physics import Judged
+from fulcrum.sim.scenario.scenario import Scenario
+from fulcrum.sim.signals.event import Event, Reaction
+from fulcrum.sim.signals.trace import Trace, stretches
+from fulcrum.synthesis.arrays import Array, Mask, N
+
+# Reactions after which a manoeuvre is not completed.
+_GIVEN_UP = {Reaction.LOWER: "broken off and the object lowered", Reaction.STOP: "stopped"}
+
+
+def rms(values: Array) -> float:
+    """Return the root mean square, 0 of no values."""
+    return float(np.sqrt(np.mean(np.square(values)))) if values.size else 0.0
+
+
+class Checks:
+    """One set of checks for all runs; what differs between runs is how much is tolerated."""
+
+    def __init__(self, scenario: Scenario, joints: tuple[str, ...], tolerances: Judged) -> None:
+        self._scenario, self._joints, self._limits = scenario, joints, tolerances
+        self._schedule = Schedule(scenario)
+        self._shared = shared_places(scenario)
+
+    def failures(
+        self,
+        info: RunInfo,
+        trace: Trace,
+        history: ContactHistory,
+        tilt: TiltReport,
+        contacts: dict[str, ContactReport],
+    ) -> tuple[Failure, ...]:
+        """Return every tolerance that was not kept, in order of time: the first is the cause."""
+        phase = trace.phase.astype(int)
+        held, free = self._schedule.held[phase], self._schedule.free[phase]
+        found = []
+        for i, contact in enumerate(contacts.values()):
+            found += self._contact(i, contact, trace, history, held)
+        for place in self._shared:
+            found += self._place(place, trace, history, held)
+        found += self._hands(trace, history, free)
+        found += self._tracking(tilt, trace)
+        found += self._torques(trace)
+        if self._limits.collisions:
+            found += [_collision(*names, t) for names, t in info.collisions.items()]
+        if self._limits.no_forces:
+            found += _no_forces(trace)
+        if self._limits.given_up:
+            found += [_gave_up(event) for event in info.events if event.reaction in _GIVEN_UP]
+        # What ended the run is why the tilt was not reached, and stands before it.
+        if info.error is not None:
+            found.append(Failure(float(trace.t[-1]), Category.ERROR, "", info.error))
+        found += self._end(tilt, trace)
+        return tuple(sorted(found, key=lambda failure: failure.t))
+
+    def _contact(
+        self,
+        i: int,
+        contact: ContactReport,
+        trace: Trace,
+        history: ContactHistory,
+        held_rows: Mask,
+    ) -> list[Failure]:
+        limits, failures = self._limits, []
+        name, hand = self._scenario.contact_names[i], i < len(self._scenario.hands)
+        off = held_rows & ~history.kept[:, i]
+        lost = off if hand else off & self._longer(off, limits.support_lost_s)
+        # What a contact does once it has let go is no news.
+        held = held_rows & ~np.logical_or.accumulate(lost)
+        if lost.any():
+            count = f"{np.count_nonzero(off)} of {np.count_nonzero(held_rows)}"
+            text = f"Contact {name} let go at {{when}}; it was lost in {count} steps."
+            failures.append(_failure(trace, lost, Category.LOST, name, text))
+        # Not "more than": what is no number is no success.
+        slip_mm = limits.slip_mm if hand else _given(limits.support_slip_mm, limits.slip_mm)
+        slip = held & ~(1e3 * history.slip[:, i] <= slip_mm)
+        slide_mm = _given(limits.slide_mm, limits.slip_mm)
+        slide = held & (1e3 * history.slide[:, i] > slide_mm)
+        if slip.any():
+            most = 1e3 * history.slip[held, i].max()
+            text = (
+                f"Contact {name} slipped more than the allowed {slip_mm:g} mm at {{when}}; "
+                f"{most:.3g} mm in all."
+            )
+            failures.append(_failure(trace, slip, Category.SLIP, name, text))
+        elif slide.any():
+            text = (
+                f"Contact {name} slid more than the allowed {slide_mm:g} mm at {{when}}; "
+                f"{contact.slide_mm:.3g} mm in all."
+            )
+            failures.append(_failure(trace, slide, Category.SLIDE, name, text))
+        spin = held & (np.degrees(np.abs(history.spin[:, i])) > limits.spin_deg)
+        if spin.any():
+            text = f"Contact {name} spun more than the allowed {limits.spin_deg:g} deg at {{when}}."
+            failures.append(_failure(trace, spin, Category.SPIN, name, text))
+        if any(i in place for place in self._shared):
+            return failures  # what is left is judged for the place as a whole
+        used = held & (history.utilisation[:, i] > limits.utilisation)
+        if used.any():
+            text = (
+                f"Contact {name} used {100 * contact.max_utilisation:.0f} % of its friction "
+                f"(allowed {100 * limits.utilisation:.0f} %), first at {{when}}."
+            )
+            failures.append(_failure(trace, used, Category.FRICTION, name, text))
+        peak = float(np.abs(trace.w_commanded_C[:, i, N]).max())
+        allowed = limits.force_error * peak
+        if peak > 0.0 and not off.any() and contact.force_error_rms_n > allowed:
+            text = (
+                f"Contact {name} followed its commanded normal force only to "
+                f"{contact.force_error_rms_n:.3g} N RMS (allowed {allowed:.3g} N)."
+            )
+            failures.append(_failure(trace, held_rows, Category.FORCE, name, text))
+        return failures
+
+    def _place(
+        self, place: tuple[int, ...], trace: Trace, history: ContactHistory, held: Mask
+    ) -> list[Failure]:
+        """The force of supports that hold the same point; how they share it is indeterminate.
+
+        So is how much of its friction one of them uses; whether it sticks is what slip says.
+        """
+        here = np.ix_(held, np.array(place))
+        if not held.any() or not history.kept[here].all():
+            return []
+        measured, commanded = (
+            np.einsum("kmij,kmj->ki", history.R_WC[here], wrenches[here][..., :3])
+            for wrenches in (history.w_measured_C, trace.w_commanded_C)
+        )
+        off = rms(np.linalg.norm(measured - commanded, axis=1))
+        peak = float(np.linalg.norm(commanded, axis=1).max())
+        if math.isinf(self._limits.force_error) or off <= self._limits.force_error * peak:
+            return []
+        names = " and ".join(self._scenario.contact_names[i] for i in place)
+        text = (
+            f"Contacts {names} together followed their commanded force only to {off:.3g} N RMS "
+            f"(allowed {self._limits.force_error * peak:.3g} N)."
+        )
+        return [_failure(trace, held, Category.FORCE, names, text)]
+
+    def _hands(self, trace: Trace, history: ContactHistory, free: Mask) -> list[Failure]:
+        """Impacts while hands come and go, and hands that touch an object that stands alone."""
+        failures = []
+        last = self._schedule.phases[-1]
+        alone = (trace.phase == len(self._schedule.phases) - 1) & (last.gap > 0.0)
+        for i, hand in enumerate(self._scenario.hands):
+            normal = history.w_measured_C[:, i, N]
+            peak = float(trace.w_commanded_C[:, i, N].max())
+            impact = free & (normal > self._limits.impact * peak)
+            if impact.any() and peak > 0.0:
+                text = (
+                    f"Hand {hand.name} hit the object with {normal[free].max():.3g} N at {{when}}, "
+                    f"more than its largest grip of {peak:.3g} N."
+                )
+                failures.append(_failure(trace, impact, Category.IMPACT, hand.name, text))
+            if self._limits.collisions and (alone & (normal > 0.0)).any():
+                text = (
+                    f"Hand {hand.name} touched the object at {{when}}, when it should stand alone."
+                )
+                found = alone & (normal > 0.0)
+                failures.append(_failure(trace, found, Category.TOUCH, hand.name, text))
+        return failures
+
+    def _tracking(self, tilt: TiltReport, trace: Trace) -> list[Failure]:
+        limits = self._limits
+        off = np.degrees(np.abs(trace.tilt - trace.tilt_ref)) > limits.error_deg
+        if not off.any():
+            return []
+        text = (
+            f"The tilt was off by more than the allowed {limits.error_deg:g} deg at {{when}}; "
+            f"{tilt.max_error_deg:.3g} deg at worst."
+        )
+        return [_failure(trace, off, Category.TRACKING, "", text)]
+
+    def _end(self, tilt: TiltReport, trace: Trace) -> list[Failure]:
+        limits = self._limits
+        if abs(tilt.final_deg - tilt.target_deg) <= limits.final_deg:
+            return []
+        text = (
+            f"The tilt ended at {tilt.final_deg:z.2f} deg instead of {tilt.target_deg:g} +- "
+            f"{limits.final_deg:g} deg."
+        )
+        return [Failure(float(trace.t[-1]), Category.TILT, "", text)]
+
+    def _torques(self, trace: Trace) -> list[Failure]:
+        allowed = self._limits.saturated_s
+        long = np.array([self._longer(flags > 0.0, allowed) for flags in trace.saturated.T]).T
+        cut = np.any(long, axis=1)
+        if not cut.any():
+            return []
+        joint = self._joints[int(np.argmax(long[np.argmax(cut)]))]
+        every = np.any(trace.saturated, axis=1)
+        count = f"{np.count_nonzero(every)} of {len(cut)}"
+        text = f"Torques were cut in {count} steps, first that of {joint} at {{when}}."
+        return [_failure(trace, cut, Category.SATURATED, joint, text)]
+
+    def _longer(self, flags: Mask, allowed_s: float) -> Mask:
+        """Where a flag has been set at a stretch for longer than allowed [s]."""
+        if math.isinf(allowed_s):
+            return np.zeros(len(flags), bool)
+        return stretches(flags.astype(float)) > round(allowed_s / self._scenario.physics.timestep)
+
+
+def _given(value: float | None, default: float) -> float:
+    return default if value is None else value
+
+
+def _collision(first: str, second: str, t: float) -> Failure:
+    pair, text = f"{first} and {second}", f"{first} touched {second} at {t:.2f} s."
+    return Failure(t, Category.COLLISION, pair, text)
+
+
+def _no_forces(trace: Trace) -> list[Failure]:
+    failed = trace.failed > 0.0
+    if not failed.any():
+        return []
+    count = int(failed.sum())
+    text = f"The synthesis found no forces {count} times, first at {{when}}."
+    return [_failure(trace, failed, Category.NO_FORCES, "", text)]
+
+
+def _gave_up(event: Event) -> Failure:
+    did = _GIVEN_UP[event.reaction]
+    text = f"The run was {did} at {event.t:.2f} s: {event.text}."
+    return Failure(event.t, Category.GIVEN_UP, event.cause, text)
+
+
+def _failure(trace: Trace, mask: Mask, category: Category, subject: str, text: str) -> Failure:
+    """A failure at the first row of a mask; ``{when}`` in its text becomes time and tilt."""
+    first = int(np.argmax(mask))
+    when = f"{trace.t[first]:.2f} s (tilt {abs(np.degrees(trace.tilt[first])):.1f} deg)"
+    return Failure(float(trace.t[first]), category, subject, text.replace("{when}", when))
