@@ -110,7 +110,7 @@ def test_a_run_and_a_plan_through_poses_are_those_of_the_screw():
     for chosen in (screw, poses):
         loop = closed_loop(chosen, controllers(chosen.control)["robust"])
         assert sum(len(block) for block in loop.run()) == loop.steps
-        assert not loop.events and not loop.collisions
+        assert not loop.controller.events and not loop.plant.collisions
         tilts.append(loop.trace.tilt)
     # The same but for what 1e-9 rad does to contact forces.
     np.testing.assert_allclose(tilts[1], tilts[0], rtol=0, atol=1e-6)
