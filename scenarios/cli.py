@@ -67,7 +67,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         print("fulcrum: interrupted.", file=sys.stderr)
         return INTERRUPTED
     except Exception as error:
-        from fulcrum.synthesis.errors import FulcrumError
+        from fulcrum.synthesis import FulcrumError
 
         if not isinstance(error, (FulcrumError, OSError)):
             traceback.print_exc()
@@ -91,7 +91,7 @@ def _parse(
     except SystemExit as stop:
         if stop.code == 0:
             raise
-        from fulcrum.synthesis.errors import InvalidInputError
+        from fulcrum.synthesis import InvalidInputError
 
         boxed = re.split(r"─{5,}", errors.getvalue())
         words = re.sub(r"[│╭╮╰╯─\s]+", " ", boxed[1] if len(boxed) > 1 else errors.getvalue())

@@ -11,34 +11,21 @@ from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from fulcrum.scenarios import scenario as named_scenario
 from fulcrum.scenarios.commands.common import asked_planning, one_of
+from fulcrum.scenarios.reading.library import scenario as named_scenario
+from fulcrum.sim.analysis import Explanation, Feasibility
 from fulcrum.sim.analysis import capacity as capacity_analysis
 from fulcrum.sim.analysis import explain as analysis
-from fulcrum.sim.analysis.explanation import Explanation
-from fulcrum.sim.analysis.feasibility import Feasibility, feasibility
-from fulcrum.sim.placement.freedom import Freedom
-from fulcrum.sim.placement.search import Effort, Placement, search
-from fulcrum.sim.placement.value import Goal
-from fulcrum.sim.planning.execution import made_plan
-from fulcrum.sim.planning.path_problems import PathProblems
-from fulcrum.sim.planning.plan import Plan
-from fulcrum.sim.planning.problem import own_margins
-from fulcrum.sim.run import environment
-from fulcrum.sim.run.execute import Request, Result, execute
-from fulcrum.sim.run.preparation import prepare
-from fulcrum.sim.run.workers import LOCAL, Workers
-from fulcrum.sim.scenario.control import (
-    Control,
-    comparable,
-    default_controller,
-)
-from fulcrum.sim.scenario.control import controller as named_controller
-from fulcrum.sim.scenario.scenario import Scenario
-from fulcrum.sim.sweep.design import Sweep
-from fulcrum.sim.sweep.farm import SweepResult, run_sweep
-from fulcrum.sim.world import presets
-from fulcrum.sim.world.parameters import ParameterGrid, overridden, parameter_name
+from fulcrum.sim.analysis.feasibility import feasibility
+from fulcrum.sim.placement import Effort, Freedom, Goal, Placement
+from fulcrum.sim.placement.search import search
+from fulcrum.sim.planning import PathProblems, Plan, made_plan, own_margins
+from fulcrum.sim.run import LOCAL, Request, Result, Workers, environment, prepare
+from fulcrum.sim.run.execute import execute
+from fulcrum.sim.scenario import Control, Scenario, comparable, default_controller
+from fulcrum.sim.scenario import controller as named_controller
+from fulcrum.sim.sweep import Sweep, SweepResult, run_sweep
+from fulcrum.sim.world import ParameterGrid, overridden, parameter_name, presets
 from fulcrum.synthesis import Synthesizer
 
 if TYPE_CHECKING:

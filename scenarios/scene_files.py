@@ -8,10 +8,10 @@ from pathlib import Path
 from fulcrum import assets
 from fulcrum.scenarios.reading.file import SCHEMA, schema
 from fulcrum.scenarios.reading.library import scenarios
-from fulcrum.sim.model.scene import compose
-from fulcrum.sim.motion.ik import plan_joints
-from fulcrum.sim.plant.mujoco import MujocoPlant
-from fulcrum.sim.scenario.scenario import Scenario
+from fulcrum.sim.model import compose
+from fulcrum.sim.motion import plan_joints
+from fulcrum.sim.plant import MujocoPlant
+from fulcrum.sim.scenario import Scenario
 
 
 def scene_xml(scenario: Scenario) -> str:

@@ -11,22 +11,3 @@ from fulcrum.synthesis.solution import (
     Solution,
 )
 from fulcrum.synthesis.synthesizer import Synthesizer
-
-__all__ = [
-    "Certificate",
-    "Contact",
-    "ContactModel",
-    "FulcrumError",
-    "InfeasibleError",
-    "InvalidInputError",
-    "Joints",
-    "Multipliers",
-    "Objective",
-    "Problem",
-    "Residuals",
-    "Role",
-    "Solution",
-    "SolverError",
-    "Synthesizer",
-    "UnboundedError",
-]

@@ -7,7 +7,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import fields
 from typing import Any
 
-from fulcrum.synthesis import InvalidInputError
+from fulcrum.synthesis.errors import InvalidInputError
 
 # Directions are typed in with a few digits, or computed; a cone is off by as little.
 _DIRECTION = 1e-6

@@ -21,7 +21,7 @@ from fulcrum.scenarios.commands.terminal import show
 from fulcrum.synthesis.render import page
 
 if TYPE_CHECKING:
-    from fulcrum.sim.analysis.feasibility import Feasibility
+    from fulcrum.sim.analysis import Feasibility
 
 RESULT, PICTURE = "check.json", "check.png"
 
@@ -43,8 +43,8 @@ class CheckCommand(Chosen):
         """Does it; returns the exit code: 0 feasible, 1 not feasible."""
         from fulcrum.sim.analysis.feasibility import feasibility
         from fulcrum.sim.analysis.picture import draw
-        from fulcrum.sim.run.files import write_json
-        from fulcrum.synthesis.errors import InvalidInputError
+        from fulcrum.sim.run import write_json
+        from fulcrum.synthesis import InvalidInputError
 
         check_json(self.json)
         chosen = self.chosen()

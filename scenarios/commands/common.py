@@ -15,9 +15,8 @@ from typing import TYPE_CHECKING, Protocol, TypeVar
 import tyro
 
 if TYPE_CHECKING:
-    from fulcrum.sim.planning.execution import Planning
-    from fulcrum.sim.scenario.control import Control
-    from fulcrum.sim.scenario.scenario import Scenario
+    from fulcrum.sim.planning import Planning
+    from fulcrum.sim.scenario import Control, Scenario
 
 Choice = TypeVar("Choice", bound=StrEnum)
 
@@ -48,8 +47,8 @@ class Chosen:
         """An error as a sentence, with the scenario's file, if it has one, and what may help."""
         from fulcrum.scenarios.reading.file import SUFFIX, open_source
         from fulcrum.scenarios.reading.source import FileError
-        from fulcrum.sim.motion.joint_path import PathError
-        from fulcrum.synthesis.errors import InvalidInputError
+        from fulcrum.sim.motion import PathError
+        from fulcrum.synthesis import InvalidInputError
 
         of_an_option = isinstance(error, InvalidInputError) and error.field.startswith("--")
         named = isinstance(error, (FileError, OSError)) or of_an_option
@@ -76,8 +75,8 @@ def chosen_control(scenario: Scenario, controller: str, objective: str | None) -
     Raises:
         InvalidInputError: There is no such controller or objective.
     """
-    from fulcrum.sim.scenario.control import controller as named
-    from fulcrum.synthesis.problem import Objective
+    from fulcrum.sim.scenario import controller as named
+    from fulcrum.synthesis import Objective
 
     control = named(scenario.control, controller, "--controller")
     if objective is None:
@@ -91,7 +90,7 @@ def one_of(kind: type[Choice], option: str, text: str) -> Choice:
     Raises:
         InvalidInputError: It names none.
     """
-    from fulcrum.synthesis.errors import InvalidInputError
+    from fulcrum.synthesis import InvalidInputError
 
     if text not in list(kind):
         raise InvalidInputError(option, text, f"one of {', '.join(kind)}")
@@ -106,7 +105,7 @@ def chosen_planning(
     Raises:
         InvalidInputError: There is no such plan, or none to be stretched or made robust.
     """
-    from fulcrum.synthesis.errors import InvalidInputError
+    from fulcrum.synthesis import InvalidInputError
 
     if plan is not None:
         return asked_planning(scenario, "--plan", plan, stretch, duration, robust)
@@ -130,9 +129,9 @@ def asked_planning(
     Raises:
         InvalidInputError: There is no such plan.
     """
-    from fulcrum.sim.planning.execution import Planning
-    from fulcrum.sim.scenario.phases import tilting
-    from fulcrum.synthesis.path.problem import PathObjective
+    from fulcrum.sim.planning import Planning
+    from fulcrum.sim.scenario import tilting
+    from fulcrum.synthesis.path import PathObjective
 
     kind = one_of(PathObjective, option, objective)
     if duration is None:
@@ -170,7 +169,7 @@ def progress_bar(name: str) -> Iterator[Move]:
 def check_json(path: Path | None) -> None:
     """Raises InvalidInputError before the work is done if a JSON file could not be written."""
     if path is not None and (path.is_dir() or not path.parent.is_dir()):
-        from fulcrum.synthesis.errors import InvalidInputError
+        from fulcrum.synthesis import InvalidInputError
 
         raise InvalidInputError("--json", str(path), "a file in a folder that exists")
 
@@ -181,7 +180,7 @@ def check_results_folder(out: Path | None) -> None:
     Raises:
         InvalidInputError: It is not empty, or cannot be a folder, or must not be written to.
     """
-    from fulcrum.sim.run.files import check_new_folder
+    from fulcrum.sim.run import check_new_folder
 
     if out is not None:
         check_new_folder("--out", out)
@@ -193,8 +192,8 @@ def results_folder(out: Path | None, name: str) -> Path:
     Raises:
         InvalidInputError: It is not empty, or cannot be made.
     """
-    from fulcrum.sim.run.files import check_new_folder, claim_folder
-    from fulcrum.synthesis.errors import InvalidInputError
+    from fulcrum.sim.run import check_new_folder, claim_folder
+    from fulcrum.synthesis import InvalidInputError
 
     folder = out or Path("logs") / f"{name}-{datetime.now():%Y%m%d-%H%M%S}"
     try:

@@ -43,10 +43,10 @@ class ExplainCommand(Chosen):
 
     def execute(self) -> int:
         """Does it; returns the exit code: 0 feasible, 1 infeasible."""
-        from fulcrum.sim.analysis.explain import explain, tightest_tilt
-        from fulcrum.sim.planning.path_problems import PathProblems
-        from fulcrum.sim.planning.robust_grip import borne
-        from fulcrum.sim.run.files import write_json
+        from fulcrum.sim.analysis import tightest_tilt
+        from fulcrum.sim.analysis.explain import explain
+        from fulcrum.sim.planning import PathProblems, borne
+        from fulcrum.sim.run import write_json
         from fulcrum.synthesis import Synthesizer
 
         check_json(self.json)
@@ -84,10 +84,9 @@ class CapacityCommand(Chosen):
 
     def execute(self) -> int:
         """Does it; returns the exit code: 1 if a run does not confirm what was found."""
-        from fulcrum.sim.analysis.capacity import capacities
-        from fulcrum.sim.evaluation.report import Verdict
-        from fulcrum.sim.run.files import write_json
-        from fulcrum.sim.run.trial import confirm
+        from fulcrum.sim.analysis import capacities
+        from fulcrum.sim.evaluation import Verdict
+        from fulcrum.sim.run import confirm, write_json
 
         check_json(self.json)
         chosen = self.chosen()

@@ -18,8 +18,8 @@ class ListCommand:
     def execute(self) -> int:
         """Does it; returns the exit code."""
         from fulcrum.scenarios.reading.library import scenarios
-        from fulcrum.sim.scenario.control import Control, controllers
-        from fulcrum.synthesis.problem import Objective
+        from fulcrum.sim.scenario import Control, controllers
+        from fulcrum.synthesis import Objective
 
         rows = [(scenario.name, scenario.summary) for scenario in scenarios().values()]
         names = (

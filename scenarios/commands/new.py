@@ -44,7 +44,7 @@ class NewCommand:
         from fulcrum.scenarios.reading.file import SCHEMA, SUFFIX, bring_schema, made, open_source
         from fulcrum.scenarios.reading.source import Source
         from fulcrum.scenarios.schema.writer import write
-        from fulcrum.synthesis.errors import InvalidInputError
+        from fulcrum.synthesis import InvalidInputError
 
         file = Path(self.name.removesuffix(SUFFIX) + SUFFIX)
         if not _NAME.fullmatch(file.stem):
@@ -65,8 +65,8 @@ class NewCommand:
 
     def _change(self, data: dict[str, Any]) -> None:
         """Makes the template that of another box: the edge stays where it is, on a table to fit."""
+        from fulcrum.synthesis import InvalidInputError
         from fulcrum.synthesis.checks import positive
-        from fulcrum.synthesis.errors import InvalidInputError
 
         asked = {"--size": self.size, "--weight": self.weight, "--friction": self.friction}
         for option, value in asked.items():

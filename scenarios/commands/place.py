@@ -22,8 +22,8 @@ from fulcrum.synthesis.render import page
 
 if TYPE_CHECKING:
     from fulcrum.scenarios.reading.source import Source
-    from fulcrum.sim.placement.freedom import Freedom
-    from fulcrum.sim.scenario.scenario import Scenario
+    from fulcrum.sim.placement import Freedom
+    from fulcrum.sim.scenario import Scenario
 
 Kept = Literal["base", "hands", "turn", "posture"]
 # Share of the time for the search; start, file and picture take the rest [-].
@@ -77,10 +77,9 @@ class PlaceCommand(Chosen):
         from fulcrum.scenarios.reading.file import bring_schema, made
         from fulcrum.scenarios.reading.placed import placed
         from fulcrum.scenarios.reading.source import Source
-        from fulcrum.sim.placement.page import placement_page
+        from fulcrum.sim.placement import Effort, Goal, placement_page
         from fulcrum.sim.placement.picture import draw
-        from fulcrum.sim.placement.search import Effort, search
-        from fulcrum.sim.placement.value import Goal
+        from fulcrum.sim.placement.search import search
 
         goal = one_of(Goal, "--goal", self.goal)
         effort = Effort(self.evaluations, _SEARCHED * self.seconds, self.seed, self.workers)
@@ -134,7 +133,7 @@ class PlaceCommand(Chosen):
         """
         from fulcrum.scenarios.reading.file import SUFFIX
         from fulcrum.scenarios.reading.placed import beside
-        from fulcrum.synthesis.errors import InvalidInputError
+        from fulcrum.synthesis import InvalidInputError
 
         named = Path(self.scenario if self.scenario.endswith(SUFFIX) else self.scenario + SUFFIX)
         out = self.out or beside(named)
@@ -152,7 +151,7 @@ class PlaceCommand(Chosen):
         Raises:
             InvalidInputError: A distance is no number >= 0.
         """
-        from fulcrum.sim.placement.freedom import Freedom
+        from fulcrum.sim.placement import Freedom
         from fulcrum.synthesis.checks import not_negative
 
         not_negative("--reach", self.reach)

@@ -18,8 +18,8 @@ from fulcrum.scenarios.commands.common import (
 from fulcrum.scenarios.commands.terminal import refuse, show
 
 if TYPE_CHECKING:
-    from fulcrum.sim.planning.problem import Margins
-    from fulcrum.sim.scenario.scenario import Scenario
+    from fulcrum.sim.planning import Margins
+    from fulcrum.sim.scenario import Scenario
 
 PLAN, PICTURE = "plan.json", "plan.png"
 
@@ -67,11 +67,9 @@ class PlanCommand(Chosen):
 
     def execute(self) -> int:
         """Does it; returns the exit code: 1 if there is no such plan."""
-        from fulcrum.sim.planning.execution import made_plan
-        from fulcrum.sim.planning.file import plan_content
+        from fulcrum.sim.planning import PlanError, made_plan, plan_content
         from fulcrum.sim.planning.picture import draw
-        from fulcrum.sim.planning.plan import PlanError
-        from fulcrum.sim.run.files import write_json
+        from fulcrum.sim.run import write_json
 
         chosen = self.chosen()
         planning = asked_planning(
@@ -98,7 +96,7 @@ class PlanCommand(Chosen):
         return PASSED
 
     def _margins(self, chosen: Scenario) -> Margins:
-        from fulcrum.sim.planning.problem import own_margins
+        from fulcrum.sim.planning import own_margins
 
         own = own_margins(chosen.control)
         return replace(

@@ -21,8 +21,7 @@ from fulcrum.scenarios.commands.terminal import refuse, show
 from fulcrum.synthesis.render import page
 
 if TYPE_CHECKING:
-    from fulcrum.sim.run.execute import Request
-    from fulcrum.sim.run.preparation import Preparation
+    from fulcrum.sim.run import Preparation, Request
 
 
 @dataclass(frozen=True)
@@ -73,10 +72,10 @@ class RunCommand(Chosen):
 
     def execute(self) -> int:
         """Does it; returns the exit code."""
-        from fulcrum.sim.evaluation.report import Verdict
-        from fulcrum.sim.planning.plan import PlanError
+        from fulcrum.sim.evaluation import Verdict
+        from fulcrum.sim.planning import PlanError
+        from fulcrum.sim.run import UnholdableError
         from fulcrum.sim.run.execute import execute as run
-        from fulcrum.sim.run.preparation import UnholdableError
 
         try:
             request, prepared = self._request()
@@ -97,7 +96,7 @@ class RunCommand(Chosen):
 
     def told(self, error: Exception) -> str:
         """Return an error as a sentence, which says so where a run is refused."""
-        from fulcrum.sim.motion.joint_path import PathError
+        from fulcrum.sim.motion import PathError
 
         told = super().told(error)
         refused = isinstance(error, PathError)
@@ -106,11 +105,9 @@ class RunCommand(Chosen):
     def _request(self) -> tuple[Request, Preparation]:
         """Return what to run, and what is prepared of it."""
         from fulcrum.scenarios.commands.sweep import drawn_world
-        from fulcrum.sim.run.execute import Request
-        from fulcrum.sim.run.preparation import prepare
-        from fulcrum.sim.scenario.control import default_controller
-        from fulcrum.sim.scenario.phases import stretched
-        from fulcrum.synthesis.errors import InvalidInputError
+        from fulcrum.sim.run import Request, prepare
+        from fulcrum.sim.scenario import default_controller, stretched
+        from fulcrum.synthesis import InvalidInputError
 
         check_results_folder(self.out)
         chosen = self.chosen()

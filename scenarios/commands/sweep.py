@@ -24,9 +24,9 @@ from fulcrum.scenarios.commands.terminal import refuse, show
 from fulcrum.synthesis.render import page
 
 if TYPE_CHECKING:
-    from fulcrum.sim.scenario.scenario import Scenario
-    from fulcrum.sim.sweep.design import Sweep
-    from fulcrum.sim.world.world import World
+    from fulcrum.sim.scenario import Scenario
+    from fulcrum.sim.sweep import Sweep
+    from fulcrum.sim.world import World
 
 
 @dataclass(frozen=True)
@@ -80,13 +80,11 @@ class SweepCommand(Chosen):
 
     def execute(self) -> int:
         """Does it; returns the exit code."""
-        from fulcrum.sim.planning.plan import PlanError
-        from fulcrum.sim.run.files import write_json
-        from fulcrum.sim.run.workers import Workers
-        from fulcrum.sim.sweep.farm import run_sweep
+        from fulcrum.sim.planning import PlanError
+        from fulcrum.sim.run import Workers, write_json
+        from fulcrum.sim.sweep import MAP, SUMMARY, Store, run_sweep
         from fulcrum.sim.sweep.picture import draw_map
-        from fulcrum.sim.sweep.store import MAP, SUMMARY, Store
-        from fulcrum.synthesis.errors import InvalidInputError
+        from fulcrum.synthesis import InvalidInputError
 
         if not 0.0 <= self.require <= 100.0:
             raise InvalidInputError("--require", self.require, "a share in [0, 100] %")
@@ -154,10 +152,10 @@ class SweepCommand(Chosen):
         return PASSED if all(100.0 * s.rate >= self.require for s in found) else FAILED
 
     def _sweep(self) -> Sweep:
-        from fulcrum.sim.planning.execution import planned_tilt
-        from fulcrum.sim.scenario.control import comparable
-        from fulcrum.sim.sweep.design import Sweep
-        from fulcrum.sim.world.parameters import parse_grid
+        from fulcrum.sim.planning import planned_tilt
+        from fulcrum.sim.scenario import comparable
+        from fulcrum.sim.sweep import Sweep
+        from fulcrum.sim.world import parse_grid
 
         chosen = self.chosen()
         asked = self.plan, self.stretch, self.duration, self.robust
@@ -180,8 +178,8 @@ class SweepCommand(Chosen):
         )
 
     def _map(self, sweep: Sweep) -> tuple[str, str]:
-        from fulcrum.sim.world.parameters import parameter_name
-        from fulcrum.synthesis.errors import InvalidInputError
+        from fulcrum.sim.world import parameter_name
+        from fulcrum.synthesis import InvalidInputError
 
         if self.map is None:
             names = [name for name, _ in sweep.grid]
@@ -210,8 +208,8 @@ def drawn_world(scenario: Scenario, preset: str, seed: int, values: str) -> Worl
     Raises:
         InvalidInputError: There is no such preset, or the values are not of the form that it names.
     """
+    from fulcrum.sim.world import overridden, parse_values
     from fulcrum.sim.world import presets as uncertainty
-    from fulcrum.sim.world.parameters import overridden, parse_values
 
     drawn = uncertainty.draw(uncertainty.preset(preset), scenario, seed)
     return overridden(drawn, scenario, parse_values("--world", values))

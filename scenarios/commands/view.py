@@ -28,7 +28,7 @@ class ScreenshotCommand:
     def execute(self) -> int:
         """Does it; returns the exit code."""
         from fulcrum.sim.recording import recording_file, screenshot
-        from fulcrum.synthesis.errors import InvalidInputError
+        from fulcrum.synthesis import InvalidInputError
 
         picture = self.out or recording_file(self.run).parent / f"screenshot-{self.at:g}.png"
         if not picture.parent.is_dir():

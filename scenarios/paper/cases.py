@@ -8,9 +8,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from fulcrum.scenarios.reading.library import scenario
-from fulcrum.sim.planning.path_problems import PathProblems
-from fulcrum.sim.scenario.path import Pivot
-from fulcrum.sim.scenario.scenario import Scenario
+from fulcrum.sim.planning import PathProblems
+from fulcrum.sim.scenario import Pivot, Scenario
 from fulcrum.synthesis import InfeasibleError, Objective, Solution, Synthesizer
 from fulcrum.synthesis.arrays import Array, N
 

@@ -20,12 +20,11 @@ from fulcrum.scenarios.paper.cases import (
 from fulcrum.scenarios.paper.figures import Curve, Figure, draw
 from fulcrum.scenarios.paper.statements import Statement, all_statements
 from fulcrum.scenarios.reading.library import scenario
-from fulcrum.sim.evaluation.report import Verdict
-from fulcrum.sim.planning.path_problems import PathProblems
-from fulcrum.sim.run.execute import Request, execute
-from fulcrum.sim.run.files import write_json
-from fulcrum.sim.scenario.control import controllers
-from fulcrum.sim.scenario.scenario import Scenario
+from fulcrum.sim.evaluation import Verdict
+from fulcrum.sim.planning import PathProblems
+from fulcrum.sim.run import Request, write_json
+from fulcrum.sim.run.execute import execute
+from fulcrum.sim.scenario import Scenario, controllers
 from fulcrum.synthesis import Objective
 from fulcrum.synthesis.arrays import N
 from fulcrum.synthesis.render import Line, Lines, Mark, Marked, Page, page

@@ -8,10 +8,8 @@ import numpy as np
 
 from fulcrum.scenarios.paper.cases import TiltCurve, paper_box, paper_cylinder
 from fulcrum.scenarios.reading.library import scenario
-from fulcrum.sim.planning.path_problems import PathProblems
-from fulcrum.sim.scenario.contacts import Friction
-from fulcrum.sim.scenario.control import controllers
-from fulcrum.sim.scenario.scenario import Scenario, lifted
+from fulcrum.sim.planning import PathProblems
+from fulcrum.sim.scenario import Friction, Scenario, controllers, lifted
 from fulcrum.synthesis import InfeasibleError, Problem, Synthesizer
 from fulcrum.synthesis.reference import solve_reference
 

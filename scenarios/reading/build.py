@@ -21,12 +21,21 @@ from fulcrum.scenarios.schema.motion import (
     TiltTable,
 )
 from fulcrum.scenarios.schema.tables import ScenarioFile
-from fulcrum.sim.geometry.pose import Pose
-from fulcrum.sim.scenario.contacts import Rest, Support
-from fulcrum.sim.scenario.path import Pivot, Poses
-from fulcrum.sim.scenario.phases import HOLD, LEAVE, REACH, TILT, Phase, stretched
-from fulcrum.sim.scenario.robot import Robot
-from fulcrum.sim.scenario.scenario import Scenario
+from fulcrum.sim.geometry import Pose
+from fulcrum.sim.scenario import (
+    HOLD,
+    LEAVE,
+    REACH,
+    TILT,
+    Phase,
+    Pivot,
+    Poses,
+    Rest,
+    Robot,
+    Scenario,
+    Support,
+    stretched,
+)
 
 
 def build(source: Source, file: ScenarioFile, access: Access) -> Scenario:

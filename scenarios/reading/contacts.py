@@ -21,10 +21,9 @@ from fulcrum.scenarios.reading.places import (
 )
 from fulcrum.scenarios.reading.source import KeyPath, Source, nearest
 from fulcrum.scenarios.schema.tables import HandTable, SupportTable, SurfaceTable
-from fulcrum.sim.geometry.geom import Geom
-from fulcrum.sim.geometry.pose import Pose
-from fulcrum.sim.model.contacts import across
-from fulcrum.sim.scenario.contacts import Hand, Support
+from fulcrum.sim.geometry import Geom, Pose
+from fulcrum.sim.model import across
+from fulcrum.sim.scenario import Hand, Support
 from fulcrum.synthesis.arrays import Array, Vector
 
 # How far from perpendicular a tangent may be typed in [-]: access are given to a micrometre, on

@@ -19,9 +19,7 @@ from fulcrum.scenarios.reading.places import vector
 from fulcrum.scenarios.reading.source import FileError, Source, explained, nearest
 from fulcrum.scenarios.schema.keys import FileTable
 from fulcrum.scenarios.schema.tables import LiftedFile, ScenarioFile
-from fulcrum.sim.scenario.path import Pivot
-from fulcrum.sim.scenario.phases import HOLD, tilting
-from fulcrum.sim.scenario.scenario import Scenario, lifted
+from fulcrum.sim.scenario import HOLD, Pivot, Scenario, lifted, tilting
 from fulcrum.synthesis import InvalidInputError
 
 SUFFIX = ".toml"

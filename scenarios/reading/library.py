@@ -7,7 +7,7 @@ from pathlib import Path
 
 from fulcrum.scenarios.reading.file import named_file, read, scene_files
 from fulcrum.scenarios.reading.scene import check_scene
-from fulcrum.sim.scenario.scenario import Scenario
+from fulcrum.sim.scenario import Scenario
 
 
 @cache

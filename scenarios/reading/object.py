@@ -11,10 +11,7 @@ from fulcrum.scenarios.reading.places import corner, only_one, orientation, vect
 from fulcrum.scenarios.reading.source import KeyPath, Source
 from fulcrum.scenarios.schema.derive import instance
 from fulcrum.scenarios.schema.tables import SHAPES, AnyObject, SurfaceTable
-from fulcrum.sim.geometry.geom import Geom
-from fulcrum.sim.geometry.object import GRAVITY, Object, homogeneous
-from fulcrum.sim.geometry.pose import Pose
-from fulcrum.sim.geometry.shape import Shape
+from fulcrum.sim.geometry import GRAVITY, Geom, Object, Pose, Shape, homogeneous
 from fulcrum.sim.geometry.shapes import Box, MeshShape
 from fulcrum.synthesis.arrays import Vector
 

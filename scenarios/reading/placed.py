@@ -9,11 +9,9 @@ from typing import Any
 import tomlkit
 
 from fulcrum.scenarios.reading.file import SCHEMA
-from fulcrum.sim.geometry.shape import Shape
-from fulcrum.sim.placement.faces import coordinates
-from fulcrum.sim.scenario.contacts import Hand
-from fulcrum.sim.scenario.robot import Robot
-from fulcrum.sim.scenario.scenario import Scenario
+from fulcrum.sim.geometry import Shape
+from fulcrum.sim.placement import coordinates
+from fulcrum.sim.scenario import Hand, Robot, Scenario
 
 _POSTURES = {"posture_deg": (math.degrees, 4), "posture_rad": (float, 6), "posture_m": (float, 6)}
 _SCHEMA = "#:schema "

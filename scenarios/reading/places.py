@@ -10,11 +10,9 @@ from scipy.spatial.transform import Rotation
 
 from fulcrum.scenarios.reading.source import KeyPath, Source
 from fulcrum.scenarios.schema.keys import Placed
-from fulcrum.sim.geometry.geom import Geom
-from fulcrum.sim.geometry.pose import Quaternion, wxyz
-from fulcrum.sim.geometry.shape import Shape
+from fulcrum.sim.geometry import Geom, Quaternion, Shape, wxyz
 from fulcrum.sim.geometry.shapes import Box, Cylinder
-from fulcrum.sim.model.contacts import across
+from fulcrum.sim.model import across
 from fulcrum.synthesis.arrays import Array, Vector
 
 # A contact that is farther off is not on the surface [m].

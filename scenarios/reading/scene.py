@@ -6,8 +6,8 @@ from pathlib import Path
 
 from fulcrum.scenarios.reading.file import open_source
 from fulcrum.scenarios.reading.source import FileError, KeyPath, Source, nearest
-from fulcrum.sim.model.scene import compose
-from fulcrum.sim.scenario.scenario import Scenario
+from fulcrum.sim.model import compose
+from fulcrum.sim.scenario import Scenario
 from fulcrum.synthesis import InvalidInputError
 
 _ONE_OF = "one of "

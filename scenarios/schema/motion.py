@@ -9,10 +9,7 @@ from pydantic import Discriminator, Field, Tag
 
 from fulcrum.scenarios.schema.derive import FromTable, same
 from fulcrum.scenarios.schema.keys import PREFIX, Corner, Direction, FileTable, Placed, Vector3
-from fulcrum.sim.scenario.path import Angle, Pivot
-from fulcrum.sim.scenario.phases import REACH, TILT, Duration, Gap, Phase
-from fulcrum.sim.scenario.robot import Robot
-from fulcrum.sim.scenario.scenario import Scenario
+from fulcrum.sim.scenario import REACH, TILT, Angle, Duration, Gap, Phase, Pivot, Robot, Scenario
 from fulcrum.synthesis.settings import NotNegative, Positive, Text
 
 _APPROACH, _TOUCH, _GRIP = REACH

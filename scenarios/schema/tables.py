@@ -27,13 +27,9 @@ from fulcrum.scenarios.schema.keys import (
     Vector3,
 )
 from fulcrum.scenarios.schema.motion import After, AnyPath, ManoeuvreTable, RobotTable
-from fulcrum.sim.geometry.geom import Geom
-from fulcrum.sim.geometry.shape import COLOR, Shape
+from fulcrum.sim.geometry import COLOR, Geom, Shape
 from fulcrum.sim.geometry.shapes import Box, Cylinder, HollowCylinder, MeshShape
-from fulcrum.sim.scenario.contacts import Friction
-from fulcrum.sim.scenario.control import Control
-from fulcrum.sim.scenario.physics import Physics, Tolerances
-from fulcrum.sim.scenario.scenario import Scenario, View
+from fulcrum.sim.scenario import Control, Friction, Physics, Scenario, Tolerances, View
 from fulcrum.synthesis.settings import Positive, Text
 
 

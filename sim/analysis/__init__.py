@@ -1,1 +1,6 @@
 """Questions about a scenario without a run: why not, how heavy, what is in the way."""
+
+from fulcrum.sim.analysis.capacity import capacities
+from fulcrum.sim.analysis.explain import tightest_tilt
+from fulcrum.sim.analysis.explanation import Explanation
+from fulcrum.sim.analysis.feasibility import Feasibility

@@ -14,14 +14,13 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.optimize import minimize_scalar
 
-from fulcrum.sim.geometry.object import GRAVITY
-from fulcrum.sim.planning.path_problems import PathProblems
-from fulcrum.sim.scenario.control import Control
-from fulcrum.sim.scenario.scenario import Scenario, lifted
-from fulcrum.sim.signals.progress import Progress
+from fulcrum.sim.geometry import GRAVITY
+from fulcrum.sim.planning import PathProblems
+from fulcrum.sim.scenario import Control, Scenario, lifted
+from fulcrum.sim.signals import Progress
 from fulcrum.synthesis import InfeasibleError, Synthesizer
-from fulcrum.synthesis.analysis.conflict import Conflict, conflict
-from fulcrum.synthesis.analysis.relaxation import Kind, change, weight_range
+from fulcrum.synthesis.analysis import Conflict, Kind, change, weight_range
+from fulcrum.synthesis.analysis.conflict import conflict
 from fulcrum.synthesis.render import Marked, Page, page
 
 _STEP_DEG = 1.0

@@ -7,13 +7,24 @@ import math
 import numpy as np
 
 from fulcrum.sim.analysis.explanation import RELAXED, Explanation, Influence, Optimum, Remedy
-from fulcrum.sim.planning.path_problems import PathProblems
-from fulcrum.synthesis import InfeasibleError, Solution, Synthesizer
-from fulcrum.synthesis.analysis.conflict import Conflict, and_list, conflict, relaxed, tightest
-from fulcrum.synthesis.analysis.relaxation import Change, ChangeOutcome, Kind, changes, weight_range
-from fulcrum.synthesis.analysis.sensitivity import UNITS, sensitivities
+from fulcrum.sim.planning import PathProblems
+from fulcrum.synthesis import InfeasibleError, Problem, Solution, Synthesizer
+from fulcrum.synthesis.analysis import (
+    UNITS,
+    Change,
+    ChangeOutcome,
+    Conflict,
+    Kind,
+    and_list,
+    changes,
+    relaxed,
+    sensitivities,
+    tightest,
+    weight_range,
+)
+from fulcrum.synthesis.analysis.conflict import conflict
 from fulcrum.synthesis.arrays import N
-from fulcrum.synthesis.problem import Gravity, Problem
+from fulcrum.synthesis.problem import Gravity
 
 # Steps of the scan for the tightest tilt [deg].
 _SCAN_DEG = 5.0

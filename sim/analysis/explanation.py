@@ -4,9 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from fulcrum.synthesis.analysis.conflict import Conflict
-from fulcrum.synthesis.analysis.relaxation import ChangeOutcome, Kind
-from fulcrum.synthesis.analysis.sensitivity import Sensitivities
+from fulcrum.synthesis.analysis import ChangeOutcome, Conflict, Kind, Sensitivities
 from fulcrum.synthesis.render import Mark, Marked, Page, page, table
 
 # By which share of it a limit is relaxed to see whether that helps.

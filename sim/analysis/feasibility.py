@@ -10,16 +10,11 @@ import numpy as np
 from fulcrum.sim.analysis.explain import explain
 from fulcrum.sim.analysis.explanation import Explanation
 from fulcrum.sim.analysis.surroundings import Surroundings, surroundings
-from fulcrum.sim.model.grip import GripSchedule
-from fulcrum.sim.model.robot_model import RobotModel
-from fulcrum.sim.motion.ik import plan_joints
-from fulcrum.sim.motion.joint_path import JointPath, PathError
-from fulcrum.sim.planning.path_problems import PathProblems
-from fulcrum.sim.planning.robust_grip import plan_grip
-from fulcrum.sim.scenario.control import Control
-from fulcrum.sim.scenario.phases import stretched, tilting
-from fulcrum.sim.scenario.scenario import Scenario
-from fulcrum.sim.signals.trace import torque_shares
+from fulcrum.sim.model import GripSchedule, RobotModel
+from fulcrum.sim.motion import JointPath, PathError, plan_joints
+from fulcrum.sim.planning import PathProblems, plan_grip
+from fulcrum.sim.scenario import Control, Scenario, stretched, tilting
+from fulcrum.sim.signals import torque_shares
 from fulcrum.synthesis import (
     InfeasibleError,
     InvalidInputError,
@@ -32,7 +27,7 @@ from fulcrum.synthesis import (
 )
 from fulcrum.synthesis.arrays import Array, N
 from fulcrum.synthesis.render import Lines, Mark, Marked, Page, page, table
-from fulcrum.synthesis.robust.certificate import RobustInfeasibleError
+from fulcrum.synthesis.robust import RobustInfeasibleError
 
 # Steps of the tilt [deg].
 _STEP_DEG = 2.5

@@ -8,7 +8,7 @@ import matplotlib as mpl
 import numpy as np
 
 from fulcrum.sim.analysis.feasibility import Feasibility
-from fulcrum.sim.scenario.scenario import Scenario
+from fulcrum.sim.scenario import Scenario
 
 mpl.use("Agg")
 from matplotlib import pyplot as plt

@@ -10,12 +10,10 @@ import numpy as np
 from scipy.optimize import linprog
 from scipy.spatial.transform import Rotation
 
-from fulcrum.sim.geometry.geom import Geom
-from fulcrum.sim.geometry.mesh import read_mesh
-from fulcrum.sim.model.collisions import distance
-from fulcrum.sim.model.object_path import ObjectPath, object_path
-from fulcrum.sim.model.scene import ObjectMotion, compose
-from fulcrum.sim.scenario.scenario import Scenario
+from fulcrum.sim.geometry import Geom, read_mesh
+from fulcrum.sim.model import ObjectMotion, ObjectPath, compose, distance
+from fulcrum.sim.model.object_path import object_path
+from fulcrum.sim.scenario import Scenario
 from fulcrum.synthesis.arrays import Array
 
 # How far things may be from where they should be [m]: what a contact may be off its surface, too.

@@ -9,23 +9,12 @@ from fulcrum.sim.control.drives import Drives
 from fulcrum.sim.control.guard import Supervisor
 from fulcrum.sim.control.health import Health, Sent
 from fulcrum.sim.control.observer import PoseObserver
-from fulcrum.sim.model.grip import GripSchedule
-from fulcrum.sim.model.inertia import inertial_wrenches
+from fulcrum.sim.model import GripSchedule, RobotModel, Statics, inertial_wrenches
 from fulcrum.sim.model.object_path import object_path
-from fulcrum.sim.model.robot_model import RobotModel
-from fulcrum.sim.model.statics import Statics
-from fulcrum.sim.motion.clock import PathClock
-from fulcrum.sim.motion.joint_path import JointPath
-from fulcrum.sim.motion.references import References
-from fulcrum.sim.scenario.control import Control
-from fulcrum.sim.scenario.scenario import Scenario
-from fulcrum.sim.signals.command import Command
-from fulcrum.sim.signals.event import Event, Mode
-from fulcrum.sim.signals.measurement import Measurement
-from fulcrum.sim.signals.setpoint import Setpoint
-from fulcrum.sim.signals.target import Target
-from fulcrum.sim.world.channel import Channel
-from fulcrum.sim.world.world import NO_DEVIATION
+from fulcrum.sim.motion import JointPath, PathClock, References
+from fulcrum.sim.scenario import Control, Scenario
+from fulcrum.sim.signals import Command, Event, Measurement, Mode, Setpoint, Target
+from fulcrum.sim.world import NO_DEVIATION, Channel
 from fulcrum.synthesis import (
     InfeasibleError,
     Problem,

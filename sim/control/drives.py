@@ -29,12 +29,9 @@ from bisect import bisect_right
 import numpy as np
 
 from fulcrum.sim.control.reaction import GripReaction
-from fulcrum.sim.model.robot_model import RobotModel, RobotState
-from fulcrum.sim.scenario.control import Control
-from fulcrum.sim.scenario.scenario import Scenario
-from fulcrum.sim.signals.measurement import Measurement
-from fulcrum.sim.signals.setpoint import Setpoint
-from fulcrum.sim.signals.target import Target
+from fulcrum.sim.model import RobotModel, RobotState
+from fulcrum.sim.scenario import Control, Scenario
+from fulcrum.sim.signals import Measurement, Setpoint, Target
 from fulcrum.synthesis.arrays import Array, Mask, N
 
 

@@ -28,8 +28,8 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 
-from fulcrum.sim.scenario.control import Guard
-from fulcrum.sim.signals.event import Cause, Event, Finding, Mode, Reaction
+from fulcrum.sim.scenario import Guard
+from fulcrum.sim.signals import Cause, Event, Finding, Mode, Reaction
 
 # What is left to be seen after the end: that everything rests [s].
 _AFTER_S = 1.0

@@ -8,13 +8,10 @@ from typing import NamedTuple
 import numpy as np
 
 from fulcrum.sim.geometry import quaternion
+from fulcrum.sim.model import RobotModel, RobotState
 from fulcrum.sim.model.object_path import object_path
-from fulcrum.sim.model.robot_model import RobotModel, RobotState
-from fulcrum.sim.scenario.control import Guard
-from fulcrum.sim.scenario.scenario import Scenario
-from fulcrum.sim.signals.event import Cause, Finding
-from fulcrum.sim.signals.measurement import Measurement
-from fulcrum.sim.signals.target import Target
+from fulcrum.sim.scenario import Guard, Scenario
+from fulcrum.sim.signals import Cause, Finding, Measurement, Target
 from fulcrum.synthesis.arrays import Array, Mask
 
 # No joint turns or moves that far, or that fast, unless its encoder is broken [rad, m, or per s].

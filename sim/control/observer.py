@@ -12,7 +12,7 @@ import math
 import numpy as np
 
 from fulcrum.sim.geometry import quaternion
-from fulcrum.sim.model.object_path import ObjectPath
+from fulcrum.sim.model import ObjectPath
 from fulcrum.synthesis.arrays import Array
 
 

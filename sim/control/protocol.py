@@ -4,11 +4,9 @@ from __future__ import annotations
 
 from typing import Protocol
 
-from fulcrum.sim.model.robot_model import RobotModel
-from fulcrum.sim.scenario.scenario import Scenario
-from fulcrum.sim.signals.command import Command
-from fulcrum.sim.signals.event import Event
-from fulcrum.sim.signals.measurement import Measurement
+from fulcrum.sim.model import RobotModel
+from fulcrum.sim.scenario import Scenario
+from fulcrum.sim.signals import Command, Event, Measurement
 
 
 class Controller(Protocol):

@@ -17,11 +17,10 @@ import math
 
 import numpy as np
 
-from fulcrum.sim.model.contacts import ContactFrames, contacts
-from fulcrum.sim.model.robot_model import RobotModel
-from fulcrum.sim.scenario.control import Control
-from fulcrum.sim.scenario.scenario import Scenario
-from fulcrum.sim.signals.setpoint import Setpoint
+from fulcrum.sim.model import ContactFrames, RobotModel
+from fulcrum.sim.model.contacts import contacts
+from fulcrum.sim.scenario import Control, Scenario
+from fulcrum.sim.signals import Setpoint
 from fulcrum.synthesis.arrays import Array, N
 from fulcrum.synthesis.contact import ContactSet
 

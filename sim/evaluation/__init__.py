@@ -1,1 +1,6 @@
 """What a run did and what it is worth: contact monitor, judge, report."""
+
+from fulcrum.sim.evaluation.judge import Judge
+from fulcrum.sim.evaluation.monitor import ContactHistory, Monitor
+from fulcrum.sim.evaluation.outcome import Outcome
+from fulcrum.sim.evaluation.report import Report, RunInfo, Verdict

@@ -9,12 +9,10 @@ import numpy as np
 from fulcrum.sim.evaluation.failure import Category, Failure
 from fulcrum.sim.evaluation.monitor import ContactHistory
 from fulcrum.sim.evaluation.report import ContactReport, RunInfo, TiltReport
-from fulcrum.sim.model.contacts import shared_places
-from fulcrum.sim.motion.schedule import Schedule
-from fulcrum.sim.scenario.physics import Judged
-from fulcrum.sim.scenario.scenario import Scenario
-from fulcrum.sim.signals.event import Event, Reaction
-from fulcrum.sim.signals.trace import Trace, stretches
+from fulcrum.sim.model import shared_places
+from fulcrum.sim.motion import Schedule
+from fulcrum.sim.scenario import Judged, Scenario
+from fulcrum.sim.signals import Event, Reaction, Trace, stretches
 from fulcrum.synthesis.arrays import Array, Mask, N
 
 # Reactions after which a manoeuvre is not completed.

@@ -19,9 +19,9 @@ from fulcrum.sim.evaluation.report import (
     TorqueReport,
     Verdict,
 )
-from fulcrum.sim.motion.schedule import Schedule
-from fulcrum.sim.scenario.scenario import Scenario
-from fulcrum.sim.signals.trace import Trace, torque_shares
+from fulcrum.sim.motion import Schedule
+from fulcrum.sim.scenario import Scenario
+from fulcrum.sim.signals import Trace, torque_shares
 from fulcrum.synthesis.arrays import Array, Mask, N
 
 

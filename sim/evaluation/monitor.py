@@ -6,10 +6,10 @@ from dataclasses import dataclass, fields
 
 import numpy as np
 
-from fulcrum.sim.model.contacts import ContactFrames, rotations, true_contacts
-from fulcrum.sim.motion.schedule import Schedule
-from fulcrum.sim.scenario.scenario import Scenario
-from fulcrum.sim.signals.trace import Trace
+from fulcrum.sim.model import ContactFrames, rotations, true_contacts
+from fulcrum.sim.motion import Schedule
+from fulcrum.sim.scenario import Scenario
+from fulcrum.sim.signals import Trace
 from fulcrum.synthesis.arrays import M_N, Array, Mask, N
 from fulcrum.synthesis.contact import utilisation
 

@@ -21,11 +21,11 @@ from enum import StrEnum
 
 import numpy as np
 
-from fulcrum.sim.geometry.object import Object
-from fulcrum.sim.model.contacts import rotations
-from fulcrum.sim.model.object_path import ObjectPath, object_path
-from fulcrum.sim.scenario.scenario import Scenario
-from fulcrum.sim.signals.trace import Trace
+from fulcrum.sim.geometry import Object
+from fulcrum.sim.model import ObjectPath, rotations
+from fulcrum.sim.model.object_path import object_path
+from fulcrum.sim.scenario import Scenario
+from fulcrum.sim.signals import Trace
 from fulcrum.synthesis.arrays import Array
 
 # Speed of a falling object [m/s].

@@ -9,7 +9,7 @@ from enum import StrEnum
 
 from fulcrum.sim.evaluation.failure import Failure
 from fulcrum.sim.evaluation.outcome import Outcome
-from fulcrum.sim.signals.event import Event
+from fulcrum.sim.signals import Event
 from fulcrum.synthesis.render import (
     Bullets,
     Heading,

@@ -5,7 +5,7 @@ from __future__ import annotations
 import mujoco
 
 from fulcrum.sim.model.scene import is_solid, unwanted_pairs
-from fulcrum.sim.scenario.scenario import Scenario
+from fulcrum.sim.scenario import Scenario
 
 DETECTION = 0.05
 """From where links look out for each other and for the scene [m]."""

@@ -7,10 +7,8 @@ import math
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from fulcrum.sim.geometry.mesh import read_mesh
-from fulcrum.sim.scenario.contacts import Friction
-from fulcrum.sim.scenario.control import Control
-from fulcrum.sim.scenario.scenario import Scenario
+from fulcrum.sim.geometry import read_mesh
+from fulcrum.sim.scenario import Control, Friction, Scenario
 from fulcrum.synthesis import Contact, ContactModel, InvalidInputError, Role
 from fulcrum.synthesis.arrays import Array, Vector
 

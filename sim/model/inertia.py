@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 
 from fulcrum.sim.model.object_path import ObjectPath
-from fulcrum.sim.scenario.scenario import Scenario
+from fulcrum.sim.scenario import Scenario
 from fulcrum.synthesis.arrays import Array
 
 

@@ -9,8 +9,7 @@ from scipy.interpolate import CubicSpline
 from scipy.spatial.transform import Rotation, RotationSpline
 
 from fulcrum.sim.geometry import quaternion
-from fulcrum.sim.scenario.path import Pivot, Poses
-from fulcrum.sim.scenario.scenario import Scenario
+from fulcrum.sim.scenario import Pivot, Poses, Scenario
 from fulcrum.synthesis import InvalidInputError
 from fulcrum.synthesis.arrays import Array
 

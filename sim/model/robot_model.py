@@ -14,7 +14,7 @@ import pinocchio as pin
 
 from fulcrum.assets import velocity_limits
 from fulcrum.sim.model.scene import compose, joint_ranges, tip_geom, tip_site
-from fulcrum.sim.scenario.scenario import Scenario
+from fulcrum.sim.scenario import Scenario
 from fulcrum.synthesis import InvalidInputError, Joints
 from fulcrum.synthesis.arrays import Array
 

@@ -14,14 +14,10 @@ from numpy.typing import NDArray
 from fulcrum.assets.mjcf import LOOKS
 from fulcrum.assets.models import hand_spec, robot_spec
 from fulcrum.assets.packages import ModelError
-from fulcrum.sim.geometry.geom import Geom
-from fulcrum.sim.geometry.mesh import read_mesh
-from fulcrum.sim.geometry.object import GRAVITY
+from fulcrum.sim.geometry import GRAVITY, Geom, read_mesh
 from fulcrum.sim.model.contacts import check_contacts
 from fulcrum.sim.model.object_path import check_supports
-from fulcrum.sim.scenario.contacts import Friction, Hand
-from fulcrum.sim.scenario.robot import Robot
-from fulcrum.sim.scenario.scenario import Scenario
+from fulcrum.sim.scenario import Friction, Hand, Robot, Scenario
 from fulcrum.synthesis import InvalidInputError
 from fulcrum.synthesis.arrays import Array
 

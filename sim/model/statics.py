@@ -4,13 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 
-from fulcrum.sim.geometry import quaternion
-from fulcrum.sim.geometry.object import GRAVITY, Object
+from fulcrum.sim.geometry import GRAVITY, Object, quaternion
 from fulcrum.sim.model.contacts import ContactFrames, contacts
 from fulcrum.sim.model.grip import GripSchedule, pressed
 from fulcrum.sim.model.robot_model import RobotState
-from fulcrum.sim.scenario.control import Control
-from fulcrum.sim.scenario.scenario import Scenario
+from fulcrum.sim.scenario import Control, Scenario
 from fulcrum.synthesis import Problem
 from fulcrum.synthesis.arrays import Array
 from fulcrum.synthesis.contact import skew

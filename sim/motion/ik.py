@@ -10,13 +10,21 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from fulcrum.assets import velocity_limits
-from fulcrum.sim.model.collisions import DETECTION, collision_pairs, distance
-from fulcrum.sim.model.contacts import ContactFrames
+from fulcrum.sim.model import (
+    DETECTION,
+    ContactFrames,
+    ObjectMotion,
+    collision_pairs,
+    compose,
+    distance,
+    joint_ranges,
+    tip_geom,
+    tip_site,
+)
 from fulcrum.sim.model.object_path import object_path
-from fulcrum.sim.model.scene import ObjectMotion, compose, joint_ranges, tip_geom, tip_site
 from fulcrum.sim.motion.joint_path import JointGrid, JointPath, PathError
 from fulcrum.sim.motion.schedule import Schedule
-from fulcrum.sim.scenario.scenario import Scenario
+from fulcrum.sim.scenario import Scenario
 from fulcrum.synthesis.arrays import Array
 
 _ITERATIONS = 50

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from fulcrum.sim.motion.joint_path import JointPath
-from fulcrum.sim.signals.target import Target
+from fulcrum.sim.signals import Target
 from fulcrum.synthesis.arrays import Array
 
 

@@ -8,9 +8,8 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from fulcrum.sim.model.object_path import minimum_jerk
-from fulcrum.sim.scenario.phases import Phase
-from fulcrum.sim.scenario.scenario import Scenario
+from fulcrum.sim.model import minimum_jerk
+from fulcrum.sim.scenario import Phase, Scenario
 from fulcrum.synthesis import InvalidInputError
 from fulcrum.synthesis.arrays import Array, Mask
 

@@ -8,11 +8,9 @@ import numpy as np
 from scipy.optimize import minimize
 from scipy.spatial.transform import Rotation
 
-from fulcrum.sim.geometry.pose import triple
-from fulcrum.sim.geometry.shape import Shape
-from fulcrum.sim.model.contacts import across
-from fulcrum.sim.scenario.contacts import Hand
-from fulcrum.sim.scenario.scenario import Scenario
+from fulcrum.sim.geometry import Shape, triple
+from fulcrum.sim.model import across
+from fulcrum.sim.scenario import Hand, Scenario
 from fulcrum.synthesis import InvalidInputError
 from fulcrum.synthesis.arrays import Array, Vector
 

@@ -9,14 +9,11 @@ import mujoco
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from fulcrum.sim.geometry.pose import Pose, triple, wxyz
-from fulcrum.sim.model.contacts import contact_axes
-from fulcrum.sim.model.scene import compose
+from fulcrum.sim.geometry import Pose, triple, wxyz
+from fulcrum.sim.model import compose, contact_axes
 from fulcrum.sim.placement.faces import Range, faces_of, moved, shape_of
 from fulcrum.sim.placement.mirror import chains, find_mirror
-from fulcrum.sim.scenario.contacts import Hand
-from fulcrum.sim.scenario.robot import Robot
-from fulcrum.sim.scenario.scenario import Scenario
+from fulcrum.sim.scenario import Hand, Robot, Scenario
 from fulcrum.synthesis import InvalidInputError
 from fulcrum.synthesis.arrays import Array
 

@@ -7,12 +7,10 @@ from dataclasses import dataclass, replace
 import mujoco
 import numpy as np
 
-from fulcrum.sim.geometry.pose import triple
-from fulcrum.sim.model.contacts import ContactFrames
-from fulcrum.sim.model.object_path import ObjectPath, object_path
-from fulcrum.sim.model.scene import compose, hand_body
-from fulcrum.sim.scenario.contacts import Hand
-from fulcrum.sim.scenario.scenario import Scenario
+from fulcrum.sim.geometry import triple
+from fulcrum.sim.model import ContactFrames, ObjectPath, compose, hand_body
+from fulcrum.sim.model.object_path import object_path
+from fulcrum.sim.scenario import Hand, Scenario
 from fulcrum.synthesis.arrays import Array, Vector
 
 # Descriptions give frames in rounded numbers [m, and sines].

@@ -6,7 +6,7 @@ import math
 
 from fulcrum.sim.placement.search import Placement
 from fulcrum.sim.placement.value import Value
-from fulcrum.sim.scenario.scenario import Scenario
+from fulcrum.sim.scenario import Scenario
 from fulcrum.synthesis.render import Lines, Mark, Marked, Page, page, table
 
 # Changes of angles below this are not listed [deg].

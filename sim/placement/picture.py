@@ -7,12 +7,11 @@ from pathlib import Path
 import matplotlib as mpl
 import numpy as np
 
-from fulcrum.sim.geometry.object import GRAVITY
-from fulcrum.sim.motion.joint_path import PathError
+from fulcrum.sim.geometry import GRAVITY
+from fulcrum.sim.motion import PathError
 from fulcrum.sim.placement.search import Placement
 from fulcrum.sim.placement.value import over_tilt
-from fulcrum.sim.scenario.control import Control
-from fulcrum.sim.scenario.scenario import Scenario
+from fulcrum.sim.scenario import Control, Scenario
 from fulcrum.synthesis.arrays import Array
 
 mpl.use("Agg")

@@ -23,16 +23,15 @@ import numpy as np
 from scipy.optimize import differential_evolution
 from scipy.stats import qmc
 
-from fulcrum.sim.evaluation.report import Report, Verdict
-from fulcrum.sim.model.collisions import Names
-from fulcrum.sim.motion.joint_path import PathError
+from fulcrum.sim.evaluation import Report, Verdict
+from fulcrum.sim.model import Names
+from fulcrum.sim.motion import PathError
 from fulcrum.sim.placement.freedom import Freedom, Moves
 from fulcrum.sim.placement.value import COARSE, FULL, Goal, Value, assess, settled, touching
-from fulcrum.sim.run.execute import Request, execute
-from fulcrum.sim.run.workers import Workers, cluster
-from fulcrum.sim.scenario.control import Control
-from fulcrum.sim.scenario.control import controller as control_named
-from fulcrum.sim.scenario.scenario import Scenario
+from fulcrum.sim.run import Request, Workers, cluster
+from fulcrum.sim.run.execute import execute
+from fulcrum.sim.scenario import Control, Scenario
+from fulcrum.sim.scenario import controller as control_named
 from fulcrum.synthesis import FulcrumError
 from fulcrum.synthesis.arrays import Array
 from fulcrum.synthesis.checks import positive, whole

@@ -10,18 +10,22 @@ import mujoco
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from fulcrum.sim.model.collisions import Names, distance, overlapping_links
+from fulcrum.sim.model import (
+    Names,
+    ObjectMotion,
+    RobotModel,
+    compose,
+    distance,
+    is_solid,
+    overlapping_links,
+)
 from fulcrum.sim.model.object_path import object_path
-from fulcrum.sim.model.robot_model import RobotModel
-from fulcrum.sim.model.scene import ObjectMotion, compose, is_solid
-from fulcrum.sim.motion.ik import plan_joints
-from fulcrum.sim.motion.joint_path import JointGrid, PathError
+from fulcrum.sim.motion import JointGrid, PathError, plan_joints
 from fulcrum.sim.placement.freedom import rounded, with_posture
-from fulcrum.sim.planning.path_problems import PathProblems
-from fulcrum.sim.scenario.control import Control
-from fulcrum.sim.scenario.scenario import Scenario
+from fulcrum.sim.planning import PathProblems
+from fulcrum.sim.scenario import Control, Scenario
 from fulcrum.synthesis import InfeasibleError, Objective, SolverError, Synthesizer, UnboundedError
-from fulcrum.synthesis.analysis.relaxation import weight_range
+from fulcrum.synthesis.analysis import weight_range
 from fulcrum.synthesis.arrays import Array
 
 

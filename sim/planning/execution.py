@@ -21,22 +21,16 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from fulcrum.sim.model.grip import GripSchedule
-from fulcrum.sim.model.robot_model import RobotModel
-from fulcrum.sim.motion.ik import plan_joints
-from fulcrum.sim.motion.joint_path import JointPath
-from fulcrum.sim.motion.schedule import Schedule
+from fulcrum.sim.model import GripSchedule, RobotModel
+from fulcrum.sim.motion import JointPath, Schedule, plan_joints
 from fulcrum.sim.planning.plan import Plan
 from fulcrum.sim.planning.problem import CERTAIN, Margins, own_margins
 from fulcrum.sim.planning.robust_plan import robust_plan
-from fulcrum.sim.scenario.control import controllers
-from fulcrum.sim.scenario.phases import Phase, stretched, tilting
-from fulcrum.sim.scenario.scenario import Scenario
-from fulcrum.sim.scenario.timing import Timing
+from fulcrum.sim.scenario import Phase, Scenario, Timing, controllers, stretched, tilting
 from fulcrum.synthesis import InvalidInputError
 from fulcrum.synthesis.arrays import N
 from fulcrum.synthesis.checks import positive
-from fulcrum.synthesis.path.problem import PathObjective
+from fulcrum.synthesis.path import PathObjective
 
 # With a shorter time constant contacts sink in no further than with the default settings.
 _SOLREF, _SOLIMP = (0.003, 1.0), (0.8, 0.8, 0.001)

@@ -5,14 +5,10 @@ from __future__ import annotations
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from fulcrum.sim.model.grip import GripSchedule
+from fulcrum.sim.model import GripSchedule, RobotModel, Statics, gravity
 from fulcrum.sim.model.object_path import object_path
-from fulcrum.sim.model.robot_model import RobotModel
-from fulcrum.sim.model.statics import Statics, gravity
-from fulcrum.sim.motion.ik import plan_joints
-from fulcrum.sim.motion.joint_path import JointPath
-from fulcrum.sim.scenario.control import Control
-from fulcrum.sim.scenario.scenario import Scenario
+from fulcrum.sim.motion import JointPath, plan_joints
+from fulcrum.sim.scenario import Control, Scenario
 from fulcrum.synthesis import InvalidInputError, Problem
 from fulcrum.synthesis.arrays import Array
 from fulcrum.synthesis.problem import Gravity

@@ -10,18 +10,22 @@ from typing import NamedTuple
 import numpy as np
 from scipy.interpolate import BSpline
 
-from fulcrum.sim.model.robot_model import RobotModel
+from fulcrum.sim.model import RobotModel
 from fulcrum.sim.planning.problem import CERTAIN, Margins, path_problem
-from fulcrum.sim.scenario.scenario import Scenario
+from fulcrum.sim.scenario import Scenario
 from fulcrum.synthesis import FulcrumError, InvalidInputError
 from fulcrum.synthesis.arrays import Array, Indices
 from fulcrum.synthesis.checks import positive
 from fulcrum.synthesis.markdown import number
-from fulcrum.synthesis.path.loads import solve_many
-from fulcrum.synthesis.path.problem import PathObjective, PathProblem
-from fulcrum.synthesis.path.solution import InfeasiblePathError, PathSolution
+from fulcrum.synthesis.path import (
+    InfeasiblePathError,
+    PathObjective,
+    PathProblem,
+    PathSolution,
+    solve_many,
+)
 from fulcrum.synthesis.render import Marked, Page, page, table, to_markdown
-from fulcrum.synthesis.robust.uncertainty_set import UncertaintySet
+from fulcrum.synthesis.robust import UncertaintySet
 
 # What the solver's accuracy may add to a limit that a plan uses up, as a share of it [-].
 _EXCESS = 1e-6

@@ -10,22 +10,17 @@ import numpy as np
 from scipy.interpolate import BSpline, make_interp_spline
 from scipy.spatial.transform import Rotation
 
-from fulcrum.sim.geometry.object import Object
+from fulcrum.sim.geometry import Object
+from fulcrum.sim.model import ObjectPath, RobotModel, Statics, gravity, inertial_wrenches
 from fulcrum.sim.model.contacts import contacts
-from fulcrum.sim.model.inertia import inertial_wrenches
-from fulcrum.sim.model.object_path import ObjectPath, object_path
-from fulcrum.sim.model.robot_model import RobotModel
-from fulcrum.sim.model.statics import Statics, gravity
-from fulcrum.sim.motion.ik import plan_joints
-from fulcrum.sim.motion.joint_path import JointPath
-from fulcrum.sim.scenario.control import Control
-from fulcrum.sim.scenario.scenario import Scenario
+from fulcrum.sim.model.object_path import object_path
+from fulcrum.sim.motion import JointPath, plan_joints
+from fulcrum.sim.scenario import Control, Scenario
 from fulcrum.synthesis import InvalidInputError, Problem
 from fulcrum.synthesis.arrays import Array
 from fulcrum.synthesis.checks import not_negative, positive
-from fulcrum.synthesis.path.limits import Accelerations, Rates
-from fulcrum.synthesis.path.problem import InertialTorques, Load, PathProblem
-from fulcrum.synthesis.robust.uncertainty_set import UncertaintySet
+from fulcrum.synthesis.path import Accelerations, InertialTorques, Load, PathProblem, Rates
+from fulcrum.synthesis.robust import UncertaintySet
 
 # Degree of the spline through the joint angles, and their pose error [m and rad]: a cubic one and
 # a tenth of the accuracy suffice to follow angles, but not for their second derivative.

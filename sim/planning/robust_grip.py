@@ -13,18 +13,14 @@ from itertools import pairwise
 
 import numpy as np
 
-from fulcrum.sim.model.grip import GripSchedule, pressed
-from fulcrum.sim.model.robot_model import RobotModel
-from fulcrum.sim.motion.joint_path import JointPath
+from fulcrum.sim.model import GripSchedule, RobotModel, pressed
+from fulcrum.sim.motion import JointPath
 from fulcrum.sim.planning.path_problems import PathProblems
-from fulcrum.sim.scenario.control import Control
-from fulcrum.sim.scenario.scenario import Scenario
-from fulcrum.synthesis import Objective, SolverError
+from fulcrum.sim.scenario import Control, Scenario
+from fulcrum.synthesis import Objective, Problem, SolverError
 from fulcrum.synthesis.arrays import Array
-from fulcrum.synthesis.problem import Gravity, Problem
-from fulcrum.synthesis.robust.certificate import RobustInfeasibleError
-from fulcrum.synthesis.robust.grip import robust_grip
-from fulcrum.synthesis.robust.scaling import Scaling, largest_scaling
+from fulcrum.synthesis.problem import Gravity
+from fulcrum.synthesis.robust import RobustInfeasibleError, Scaling, largest_scaling, robust_grip
 
 # The grid's coarsest and finest step. Half of the finest is half of what one contact set of
 # :mod:`fulcrum.sim.model.statics` stands for [deg].

@@ -7,12 +7,12 @@ from dataclasses import replace
 
 import numpy as np
 
-from fulcrum.sim.model.robot_model import RobotModel
+from fulcrum.sim.model import RobotModel
 from fulcrum.sim.planning.plan import Plan, PlanError, plan
 from fulcrum.sim.planning.problem import CERTAIN, Margins
-from fulcrum.sim.scenario.scenario import Scenario
-from fulcrum.synthesis.path.problem import PathObjective
-from fulcrum.synthesis.robust.uncertainty_set import UncertaintySet
+from fulcrum.sim.scenario import Scenario
+from fulcrum.synthesis.path import PathObjective
+from fulcrum.synthesis.robust import UncertaintySet
 
 # Shares are found to within two to the power of minus this, on a grid of so many points.
 _HALVINGS, _POINTS = 4, 41

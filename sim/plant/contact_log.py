@@ -6,8 +6,8 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from fulcrum.sim.model.scene import tip_geom, unwanted_pairs
-from fulcrum.sim.scenario.scenario import Scenario
+from fulcrum.sim.model import tip_geom, unwanted_pairs
+from fulcrum.sim.scenario import Scenario
 from fulcrum.synthesis.arrays import Array
 
 # A plant contact belongs to the environment contact point within this distance [m].

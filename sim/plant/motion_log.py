@@ -6,9 +6,9 @@ import mujoco
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from fulcrum.sim.model.scene import tip_site
-from fulcrum.sim.scenario.scenario import Scenario
-from fulcrum.sim.signals.trace import Trace
+from fulcrum.sim.model import tip_site
+from fulcrum.sim.scenario import Scenario
+from fulcrum.sim.signals import Trace
 from fulcrum.synthesis.arrays import Array
 
 # Steps that there is room for at first.

@@ -9,17 +9,14 @@ import mujoco
 import numpy as np
 from dm_control.rl.control import PhysicsError
 
-from fulcrum.sim.model.contacts import rotations
-from fulcrum.sim.model.scene import compose
+from fulcrum.sim.model import compose, rotations
 from fulcrum.sim.plant.contact_log import ContactLog, ContactReader
 from fulcrum.sim.plant.motion_log import MotionLog
 from fulcrum.sim.plant.protocol import DivergedError
 from fulcrum.sim.plant.truth import make_true
-from fulcrum.sim.scenario.scenario import Scenario
-from fulcrum.sim.signals.force import AppliedForce
-from fulcrum.sim.signals.measurement import Measurement
-from fulcrum.sim.signals.trace import Trace
-from fulcrum.sim.world.world import NO_DEVIATION, World
+from fulcrum.sim.scenario import Scenario
+from fulcrum.sim.signals import AppliedForce, Measurement, Trace
+from fulcrum.sim.world import NO_DEVIATION, World
 from fulcrum.synthesis.arrays import Array
 
 with warnings.catch_warnings():  # dm_control looks for a display on import; none is needed

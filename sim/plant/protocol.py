@@ -5,9 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Protocol
 
-from fulcrum.sim.signals.force import AppliedForce
-from fulcrum.sim.signals.measurement import Measurement
-from fulcrum.sim.signals.trace import Trace
+from fulcrum.sim.signals import AppliedForce, Measurement, Trace
 from fulcrum.synthesis import FulcrumError
 from fulcrum.synthesis.arrays import Array
 

@@ -5,9 +5,9 @@ from __future__ import annotations
 import mujoco
 import numpy as np
 
-from fulcrum.sim.model.scene import hand_body, tip_site
-from fulcrum.sim.scenario.scenario import Scenario
-from fulcrum.sim.world.world import World
+from fulcrum.sim.model import hand_body, tip_site
+from fulcrum.sim.scenario import Scenario
+from fulcrum.sim.world import World
 
 
 def make_true(model: mujoco.MjModel, scenario: Scenario, world: World) -> None:

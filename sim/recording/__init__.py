@@ -9,13 +9,3 @@ from fulcrum.sim.recording.viewer import (
     screenshot,
     view,
 )
-
-__all__ = [
-    "Recorder",
-    "headless_viewer",
-    "open_viewer",
-    "readable",
-    "recording_file",
-    "screenshot",
-    "view",
-]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import rerun.blueprint as rrb
 
-from fulcrum.sim.scenario.scenario import Scenario
+from fulcrum.sim.scenario import Scenario
 from fulcrum.synthesis.arrays import Array
 
 TIMELINE = "time"

@@ -11,16 +11,15 @@ import numpy as np
 import rerun as rr
 from rerun.components import AggregationPolicy
 
-from fulcrum.sim.evaluation.monitor import ContactHistory
-from fulcrum.sim.model.contacts import true_contacts
+from fulcrum.sim.evaluation import ContactHistory
+from fulcrum.sim.model import true_contacts
 from fulcrum.sim.model.object_path import object_path
-from fulcrum.sim.planning.plan import Plan
+from fulcrum.sim.planning import Plan
 from fulcrum.sim.recording.blueprint import TIMELINE, blueprint
 from fulcrum.sim.recording.columns import arrows, scalars, strips
 from fulcrum.sim.recording.scenery import Scenery
-from fulcrum.sim.scenario.scenario import Scenario
-from fulcrum.sim.signals.event import Mode
-from fulcrum.sim.signals.trace import Trace, torque_shares
+from fulcrum.sim.scenario import Scenario
+from fulcrum.sim.signals import Mode, Trace, torque_shares
 from fulcrum.synthesis.arrays import Array, N
 
 

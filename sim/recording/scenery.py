@@ -13,12 +13,11 @@ from scipy.spatial.transform import Rotation
 from fulcrum.assets.mjcf import LOOKS
 from fulcrum.assets.models import looks_of
 from fulcrum.assets.visuals import Visual, link_names, load_visuals
-from fulcrum.sim.model.scene import ObjectMotion, compose, hand_body
+from fulcrum.sim.model import ObjectMotion, compose, hand_body
 from fulcrum.sim.recording.blueprint import TIMELINE
 from fulcrum.sim.recording.columns import poses
-from fulcrum.sim.scenario.robot import Robot
-from fulcrum.sim.scenario.scenario import Scenario
-from fulcrum.sim.signals.trace import Trace
+from fulcrum.sim.scenario import Robot, Scenario
+from fulcrum.sim.signals import Trace
 from fulcrum.synthesis.arrays import Array
 
 WORLD = "world"

@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-from fulcrum.sim.control.controller import ForceController
-from fulcrum.sim.plant.mujoco import MujocoPlant
+from fulcrum.sim.control import ForceController
+from fulcrum.sim.plant import MujocoPlant
 from fulcrum.sim.run.loop import ClosedLoop
 from fulcrum.sim.run.preparation import Preparation, prepare
-from fulcrum.sim.scenario.control import Control
-from fulcrum.sim.scenario.scenario import Scenario
-from fulcrum.sim.world.channel import Channel
-from fulcrum.sim.world.world import NO_DEVIATION, World
+from fulcrum.sim.scenario import Control, Scenario
+from fulcrum.sim.world import NO_DEVIATION, Channel, World
 
 
 def closed_loop(

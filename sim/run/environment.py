@@ -9,13 +9,12 @@ import numpy as np
 from dm_control.rl import control
 from dm_env import specs
 
+from fulcrum.sim.model import RobotModel
 from fulcrum.sim.model.object_path import object_path
-from fulcrum.sim.model.robot_model import RobotModel
-from fulcrum.sim.motion.ik import plan_joints
-from fulcrum.sim.motion.schedule import Schedule
-from fulcrum.sim.plant.mujoco import MujocoPlant
-from fulcrum.sim.scenario.scenario import Scenario
-from fulcrum.sim.signals.trace import Trace
+from fulcrum.sim.motion import Schedule, plan_joints
+from fulcrum.sim.plant import MujocoPlant
+from fulcrum.sim.scenario import Scenario
+from fulcrum.sim.signals import Trace
 from fulcrum.synthesis import InvalidInputError
 from fulcrum.synthesis.arrays import Array
 from fulcrum.synthesis.checks import positive

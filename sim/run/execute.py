@@ -14,20 +14,16 @@ from pathlib import Path
 from types import FrameType
 from typing import Any
 
-from fulcrum.sim.evaluation.judge import Judge
-from fulcrum.sim.evaluation.monitor import ContactHistory, Monitor
-from fulcrum.sim.evaluation.report import Report, RunInfo
-from fulcrum.sim.planning.execution import Planning
-from fulcrum.sim.plant.protocol import DivergedError
+from fulcrum.sim.evaluation import ContactHistory, Judge, Monitor, Report, RunInfo
+from fulcrum.sim.planning import Planning
+from fulcrum.sim.plant import DivergedError
 from fulcrum.sim.recording import Recorder, open_viewer
 from fulcrum.sim.run.assembly import closed_loop
 from fulcrum.sim.run.files import check_new_folder, finite, write_json
 from fulcrum.sim.run.preparation import Preparation, prepare
-from fulcrum.sim.scenario.control import Control, controller, default_controller
-from fulcrum.sim.scenario.scenario import Scenario
-from fulcrum.sim.signals.progress import Progress
-from fulcrum.sim.signals.trace import Trace
-from fulcrum.sim.world.world import NO_DEVIATION, World
+from fulcrum.sim.scenario import Control, Scenario, controller, default_controller
+from fulcrum.sim.signals import Progress, Trace
+from fulcrum.sim.world import NO_DEVIATION, World
 from fulcrum.synthesis.render import Page, page, to_markdown
 
 RECORDING, CONFIG, REPORT = "run.rrd", "config.json", "report.json"

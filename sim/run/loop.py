@@ -6,18 +6,13 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from fulcrum.sim.control.protocol import Controller
-from fulcrum.sim.model.contacts import ContactFrames
+from fulcrum.sim.control import Controller
+from fulcrum.sim.model import ContactFrames, RobotModel
 from fulcrum.sim.model.object_path import object_path
-from fulcrum.sim.model.robot_model import RobotModel
-from fulcrum.sim.plant.protocol import DivergedError, Plant
-from fulcrum.sim.scenario.scenario import Scenario
-from fulcrum.sim.signals.measurement import Measurement
-from fulcrum.sim.signals.trace import Trace
-from fulcrum.sim.world.motors import Motors
-from fulcrum.sim.world.pushes import Pushes
-from fulcrum.sim.world.sensors import Sensors
-from fulcrum.sim.world.world import World
+from fulcrum.sim.plant import DivergedError, Plant
+from fulcrum.sim.scenario import Scenario
+from fulcrum.sim.signals import Measurement, Trace
+from fulcrum.sim.world import Motors, Pushes, Sensors, World
 from fulcrum.synthesis.arrays import Array
 
 # Time per block that is handed on while the loop runs [s]; what an abrupt end may lose.

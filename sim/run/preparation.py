@@ -4,17 +4,12 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from fulcrum.sim.analysis import Explanation
 from fulcrum.sim.analysis.explain import explain
-from fulcrum.sim.analysis.explanation import Explanation
-from fulcrum.sim.model.grip import GripSchedule
-from fulcrum.sim.model.robot_model import RobotModel
-from fulcrum.sim.motion.ik import plan_joints
-from fulcrum.sim.motion.joint_path import JointPath
-from fulcrum.sim.planning.execution import Execution, Planning, planned_tilt
-from fulcrum.sim.planning.path_problems import PathProblems
-from fulcrum.sim.planning.robust_grip import plan_grip
-from fulcrum.sim.scenario.control import Control
-from fulcrum.sim.scenario.scenario import Scenario
+from fulcrum.sim.model import GripSchedule, RobotModel
+from fulcrum.sim.motion import JointPath, plan_joints
+from fulcrum.sim.planning import Execution, PathProblems, Planning, plan_grip, planned_tilt
+from fulcrum.sim.scenario import Control, Scenario
 from fulcrum.synthesis import (
     FulcrumError,
     InfeasibleError,

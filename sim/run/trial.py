@@ -4,12 +4,11 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 
-from fulcrum.sim.evaluation.report import Verdict
-from fulcrum.sim.geometry.object import GRAVITY
+from fulcrum.sim.evaluation import Verdict
+from fulcrum.sim.geometry import GRAVITY
 from fulcrum.sim.run.execute import Request, execute
-from fulcrum.sim.scenario.control import Control
-from fulcrum.sim.scenario.scenario import Scenario
-from fulcrum.sim.signals.progress import Progress
+from fulcrum.sim.scenario import Control, Scenario
+from fulcrum.sim.signals import Progress
 from fulcrum.synthesis.render import Bullets, Page, page
 
 # How many of its failures a page tells.

@@ -6,7 +6,7 @@ import math
 from dataclasses import dataclass
 from typing import Annotated
 
-from fulcrum.sim.geometry.pose import Pose
+from fulcrum.sim.geometry import Pose
 from fulcrum.synthesis import InvalidInputError
 from fulcrum.synthesis.arrays import Vector
 from fulcrum.synthesis.checks import axes, vector

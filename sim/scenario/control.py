@@ -8,7 +8,7 @@ from typing import Annotated
 from annotated_types import Ge, Gt, Le
 
 from fulcrum.synthesis import InvalidInputError, Objective
-from fulcrum.synthesis.robust.uncertainty_set import UncertaintySet
+from fulcrum.synthesis.robust import UncertaintySet
 from fulcrum.synthesis.settings import Inline, Key, NotNegative, OrInfinite, Settings
 
 

@@ -10,7 +10,7 @@ import numpy as np
 from annotated_types import Gt, Lt
 from scipy.spatial.transform import Rotation
 
-from fulcrum.sim.geometry.pose import Pose, triple
+from fulcrum.sim.geometry import Pose, triple
 from fulcrum.synthesis import InvalidInputError
 from fulcrum.synthesis.arrays import Array, Vector
 from fulcrum.synthesis.settings import Settings

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
-from fulcrum.sim.geometry.pose import Pose
+from fulcrum.sim.geometry import Pose
 from fulcrum.synthesis import InvalidInputError
 from fulcrum.synthesis.settings import NotNegative, Positive, Settings
 

@@ -5,8 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from typing import Annotated
 
-from fulcrum.sim.geometry.geom import Geom
-from fulcrum.sim.geometry.object import GRAVITY, Object
+from fulcrum.sim.geometry import GRAVITY, Geom, Object
 from fulcrum.sim.scenario.contacts import Hand, Rest, Support
 from fulcrum.sim.scenario.control import Control
 from fulcrum.sim.scenario.path import Pivot, Poses

@@ -1,1 +1,5 @@
 """Many runs in drawn worlds: design, episodes on workers, rows, rates."""
+
+from fulcrum.sim.sweep.design import Sweep
+from fulcrum.sim.sweep.farm import SweepResult, run_sweep
+from fulcrum.sim.sweep.store import MAP, SUMMARY, Store

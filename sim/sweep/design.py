@@ -9,14 +9,10 @@ from dataclasses import dataclass
 from importlib.metadata import version
 from typing import Any
 
-from fulcrum.sim.planning.execution import Planning
-from fulcrum.sim.run.execute import PACKAGES
-from fulcrum.sim.run.files import finite
-from fulcrum.sim.scenario.control import controllers
-from fulcrum.sim.scenario.scenario import Scenario
-from fulcrum.sim.world.parameters import ParameterGrid, overridden
-from fulcrum.sim.world.presets import draw, preset
-from fulcrum.sim.world.world import World
+from fulcrum.sim.planning import Planning
+from fulcrum.sim.run import PACKAGES, finite
+from fulcrum.sim.scenario import Scenario, controllers
+from fulcrum.sim.world import ParameterGrid, World, draw, overridden, preset
 from fulcrum.synthesis import InvalidInputError
 from fulcrum.synthesis.checks import whole
 

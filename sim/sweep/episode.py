@@ -9,21 +9,17 @@ from collections.abc import Mapping, Sequence
 from functools import lru_cache
 from typing import Any
 
-from fulcrum.sim.evaluation.outcome import Outcome
-from fulcrum.sim.evaluation.report import Verdict
-from fulcrum.sim.model.robot_model import RobotModel
-from fulcrum.sim.motion.ik import plan_joints
-from fulcrum.sim.planning.execution import planned_tilt
-from fulcrum.sim.plant.protocol import DivergedError
-from fulcrum.sim.run.execute import Request, Result, execute
-from fulcrum.sim.run.files import finite
-from fulcrum.sim.run.preparation import Preparation, prepare
-from fulcrum.sim.scenario.control import Control, controllers
-from fulcrum.sim.scenario.scenario import Scenario
-from fulcrum.sim.signals.trace import stretches
+from fulcrum.sim.evaluation import Outcome, Verdict
+from fulcrum.sim.model import RobotModel
+from fulcrum.sim.motion import plan_joints
+from fulcrum.sim.planning import planned_tilt
+from fulcrum.sim.plant import DivergedError
+from fulcrum.sim.run import Preparation, Request, Result, finite, prepare
+from fulcrum.sim.run.execute import execute
+from fulcrum.sim.scenario import Control, Scenario, controllers
+from fulcrum.sim.signals import stretches
 from fulcrum.sim.sweep.design import Episode, Sweep
-from fulcrum.sim.world.parameters import PARAMETERS
-from fulcrum.sim.world.world import World
+from fulcrum.sim.world import PARAMETERS, World
 from fulcrum.synthesis import FulcrumError
 
 Row = dict[str, Any]

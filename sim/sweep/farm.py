@@ -11,7 +11,7 @@ from pathlib import Path
 import pyarrow as pa
 from distributed import KilledWorker, as_completed
 
-from fulcrum.sim.run.workers import LOCAL, Workers, cluster
+from fulcrum.sim.run import LOCAL, Workers, cluster
 from fulcrum.sim.sweep.design import Episode, Sweep
 from fulcrum.sim.sweep.episode import check_holdable, run_episode
 from fulcrum.sim.sweep.store import Store

@@ -12,7 +12,7 @@ from matplotlib.colors import Normalize
 from matplotlib.figure import Figure
 
 from fulcrum.sim.sweep.design import Sweep
-from fulcrum.sim.world.parameters import PARAMETERS
+from fulcrum.sim.world import PARAMETERS
 from fulcrum.synthesis.arrays import Array
 
 # Of sampled parameters, which have no grid: so many bins a side.

@@ -11,7 +11,7 @@ from typing import Any
 import pyarrow as pa
 import pyarrow.parquet as pq
 
-from fulcrum.sim.run.files import check_new_folder, write_json
+from fulcrum.sim.run import check_new_folder, write_json
 from fulcrum.sim.sweep.design import Episode, Sweep
 from fulcrum.sim.sweep.episode import Row
 from fulcrum.synthesis import InvalidInputError

@@ -6,7 +6,7 @@ from collections import deque
 
 import numpy as np
 
-from fulcrum.sim.signals.setpoint import Setpoint
+from fulcrum.sim.signals import Setpoint
 from fulcrum.sim.world.faults import FaultKind, of_kinds
 from fulcrum.sim.world.world import World
 

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from fulcrum.sim.scenario.scenario import Scenario
+from fulcrum.sim.scenario import Scenario
 from fulcrum.sim.world.world import World
 from fulcrum.synthesis import InvalidInputError
 

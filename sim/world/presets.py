@@ -7,9 +7,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from fulcrum.sim.model.scene import compose, object_bounds
-from fulcrum.sim.motion.schedule import Schedule
-from fulcrum.sim.scenario.scenario import Scenario
+from fulcrum.sim.model import compose, object_bounds
+from fulcrum.sim.motion import Schedule
+from fulcrum.sim.scenario import Scenario
 from fulcrum.sim.world.world import Push, World
 from fulcrum.synthesis import InvalidInputError
 from fulcrum.synthesis.arrays import Array

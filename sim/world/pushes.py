@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from fulcrum.sim.signals.force import AppliedForce
+from fulcrum.sim.signals import AppliedForce
 from fulcrum.sim.world.faults import FaultKind, of_kinds
 from fulcrum.sim.world.world import World
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from fulcrum.sim.geometry import quaternion
-from fulcrum.sim.signals.measurement import Measurement
+from fulcrum.sim.signals import Measurement
 from fulcrum.sim.world.faults import Fault, FaultKind, of_kinds
 from fulcrum.sim.world.world import World
 from fulcrum.synthesis.arrays import Array

@@ -10,12 +10,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from fulcrum.sim.geometry.geom import Geom
-from fulcrum.sim.geometry.object import Object
-from fulcrum.sim.geometry.pose import triple
-from fulcrum.sim.model.contacts import contact_axes
-from fulcrum.sim.scenario.contacts import Friction, Hand, Rest, Support
-from fulcrum.sim.scenario.scenario import Scenario
+from fulcrum.sim.geometry import Geom, Object, triple
+from fulcrum.sim.model import contact_axes
+from fulcrum.sim.scenario import Friction, Hand, Rest, Scenario, Support
 from fulcrum.sim.world.faults import Fault
 from fulcrum.synthesis import InvalidInputError
 from fulcrum.synthesis.arrays import Vector

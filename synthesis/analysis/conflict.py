@@ -22,10 +22,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from fulcrum.synthesis import Certificate, Problem
 from fulcrum.synthesis.analysis.relaxation import Change, ChangeOutcome, Kind
 from fulcrum.synthesis.arrays import Array, N
-from fulcrum.synthesis.problem import Gravity, Problem
-from fulcrum.synthesis.solution import Certificate
+from fulcrum.synthesis.problem import Gravity
 from fulcrum.synthesis.solution import certificate as make_certificate
 
 # Shares below this are the solver's noise and left out.

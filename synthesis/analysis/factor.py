@@ -17,9 +17,8 @@ import clarabel
 import numpy as np
 import scipy.sparse as sp
 
+from fulcrum.synthesis import Problem, SolverError
 from fulcrum.synthesis.conic import ConicForm
-from fulcrum.synthesis.errors import SolverError
-from fulcrum.synthesis.problem import Problem
 from fulcrum.synthesis.solver import SOLVED, fallback_settings, solver_settings
 
 # Linear factors below this are zero to the solver.

@@ -21,13 +21,19 @@ from enum import StrEnum
 
 import numpy as np
 
+from fulcrum.synthesis import (
+    Certificate,
+    ContactModel,
+    InfeasibleError,
+    Objective,
+    Problem,
+    SolverError,
+    Synthesizer,
+)
 from fulcrum.synthesis.analysis.factor import EmptyRangeError, factor_range
 from fulcrum.synthesis.arrays import Array
-from fulcrum.synthesis.contact import ContactModel
-from fulcrum.synthesis.errors import SolverError
-from fulcrum.synthesis.problem import Gravity, Objective, Problem
-from fulcrum.synthesis.solution import Certificate, InfeasibleError, shrink_cones
-from fulcrum.synthesis.synthesizer import Synthesizer
+from fulcrum.synthesis.problem import Gravity
+from fulcrum.synthesis.solution import shrink_cones
 
 # How far to either side of a factor it is confirmed, relative. The first is a thousand solver
 # tolerances; the others serve where forces are a hundred and more times the weight.

@@ -38,10 +38,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from fulcrum.synthesis import ContactModel, Objective, Solution
 from fulcrum.synthesis.arrays import N
-from fulcrum.synthesis.contact import ContactModel
-from fulcrum.synthesis.problem import Gravity, Objective
-from fulcrum.synthesis.solution import Solution
+from fulcrum.synthesis.problem import Gravity
 
 # What the objective's unit is, for people.
 UNITS = {

@@ -35,12 +35,12 @@ from typing import Any, NamedTuple
 import numpy as np
 import scipy.sparse as sp
 
+from fulcrum.synthesis import Objective, Problem
 from fulcrum.synthesis.arrays import Array, Indices, Mask
 from fulcrum.synthesis.conic import ConicForm
 from fulcrum.synthesis.path.cones import timing_cones
 from fulcrum.synthesis.path.problem import Load, PathObjective, PathProblem
 from fulcrum.synthesis.path.rows import Rows
-from fulcrum.synthesis.problem import Objective, Problem
 
 
 class _Block(NamedTuple):

@@ -6,8 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from fulcrum.synthesis import InvalidInputError
 from fulcrum.synthesis.arrays import Array
-from fulcrum.synthesis.errors import InvalidInputError
 
 
 @dataclass(frozen=True, eq=False)

@@ -13,11 +13,9 @@ from enum import StrEnum
 
 import numpy as np
 
+from fulcrum.synthesis import ContactModel, InvalidInputError, Problem
 from fulcrum.synthesis.arrays import Array, Indices
-from fulcrum.synthesis.contact import ContactModel
-from fulcrum.synthesis.errors import InvalidInputError
 from fulcrum.synthesis.path.limits import Accelerations, Rates, check_array
-from fulcrum.synthesis.problem import Problem
 
 
 class PathObjective(StrEnum):

@@ -8,9 +8,9 @@ from functools import cached_property
 
 import numpy as np
 
+from fulcrum.synthesis import FulcrumError
 from fulcrum.synthesis.arrays import Array, N
 from fulcrum.synthesis.contact import ContactSet, utilisation
-from fulcrum.synthesis.errors import FulcrumError
 from fulcrum.synthesis.path.problem import PathProblem
 
 # From this share of a limit on a constraint counts as active.

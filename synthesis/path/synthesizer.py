@@ -13,9 +13,8 @@ from dataclasses import dataclass, replace
 import clarabel
 import numpy as np
 
+from fulcrum.synthesis import ContactModel, SolverError, UnboundedError
 from fulcrum.synthesis.arrays import Array, N
-from fulcrum.synthesis.contact import ContactModel
-from fulcrum.synthesis.errors import SolverError, UnboundedError
 from fulcrum.synthesis.path.form import PathForm
 from fulcrum.synthesis.path.problem import PathObjective, PathProblem
 from fulcrum.synthesis.path.solution import InfeasiblePathError, PathSolution

@@ -14,10 +14,8 @@ from functools import cached_property
 
 import numpy as np
 
+from fulcrum.synthesis import FulcrumError, Multipliers, Problem
 from fulcrum.synthesis.arrays import N
-from fulcrum.synthesis.errors import FulcrumError
-from fulcrum.synthesis.problem import Problem
-from fulcrum.synthesis.solution import Multipliers
 
 
 @dataclass(frozen=True, eq=False)

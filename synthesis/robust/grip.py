@@ -34,10 +34,9 @@ import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
 
+from fulcrum.synthesis import InvalidInputError, Objective, Problem, SolverError
 from fulcrum.synthesis.arrays import Array, N
 from fulcrum.synthesis.conic import ConicForm, structure
-from fulcrum.synthesis.errors import InvalidInputError, SolverError
-from fulcrum.synthesis.problem import Objective, Problem
 from fulcrum.synthesis.robust.certificate import (
     RobustCertificate,
     RobustInfeasibleError,

@@ -11,8 +11,8 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-from fulcrum.synthesis.errors import SolverError
-from fulcrum.synthesis.problem import Gravity, Problem
+from fulcrum.synthesis import Problem, SolverError
+from fulcrum.synthesis.problem import Gravity
 from fulcrum.synthesis.robust.certificate import RobustCertificate, RobustInfeasibleError
 from fulcrum.synthesis.robust.grip import RobustGrip, robust_grip
 from fulcrum.synthesis.robust.uncertainty_set import UncertaintySet

@@ -27,10 +27,10 @@ from typing import Annotated
 import numpy as np
 from scipy.spatial import ConvexHull, QhullError
 
+from fulcrum.synthesis import Contact, ContactModel, InvalidInputError, Joints, Problem
 from fulcrum.synthesis.arrays import Array, Indices, N, Vector
-from fulcrum.synthesis.contact import Contact, ContactModel, skew
-from fulcrum.synthesis.errors import InvalidInputError
-from fulcrum.synthesis.problem import Gravity, Joints, Problem
+from fulcrum.synthesis.contact import skew
+from fulcrum.synthesis.problem import Gravity
 from fulcrum.synthesis.settings import Fraction, Key, NotNegative, Settings, Spread3
 
 # Points of a hull that differ by less than this share of its size are one: rounding, and no more.

@@ -71,7 +71,7 @@ NAMED = {
     "duration that is no number": "long",
     "negative duration": "-1.0",
     "NaN duration": "nan",
-    "duration beyond memory": "600 s",
+    "duration beyond memory": "<= 600",
     "duration too short for the arms": "speed limit",
     "negative seed": "--seed",
     "seed that is no integer": "1.5",
