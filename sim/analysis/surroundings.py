@@ -12,9 +12,9 @@ from scipy.spatial.transform import Rotation
 
 from fulcrum.sim.geometry.geom import Geom
 from fulcrum.sim.geometry.mesh import read_mesh
-from fulcrum.sim.model.collisions import distance
+from fulcrum.sim.model.links import distance
 from fulcrum.sim.model.object_path import ObjectPath, object_path
-from fulcrum.sim.model.scene import ObjectMotion, compose
+from fulcrum.sim.model.scene import ObjectMotion, compose, object_pairs
 from fulcrum.sim.scenario.scenario import Scenario
 from fulcrum.synthesis.arrays import Array
 
@@ -136,16 +136,7 @@ def _room(scenario: Scenario, path: ObjectPath, tilts: Array) -> Misfit | None:
 
 def _meeting(scenario: Scenario) -> list[tuple[str, str]]:
     """Geoms of the object, and what is in their way: where it rests, those that touch alone."""
-    resting = _resting(scenario)
-    surfaces = {surface for _, surface in resting}
-    solid = [
-        (own.name, other.name)
-        for other in scenario.environment
-        if other.solid and other.name not in surfaces
-        for own in scenario.object.geoms
-        if own.solid
-    ]
-    return [*resting, *solid]
+    return [*_resting(scenario), *object_pairs(scenario)]
 
 
 def _resting(scenario: Scenario) -> list[tuple[str, str]]:

@@ -11,13 +11,13 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from fulcrum.assets.mjcf import LOOKS
 from fulcrum.assets.models import hand_spec, robot_spec
 from fulcrum.assets.packages import ModelError
 from fulcrum.sim.geometry.geom import Geom
 from fulcrum.sim.geometry.mesh import read_mesh
 from fulcrum.sim.geometry.object import GRAVITY
 from fulcrum.sim.model.contacts import check_contacts
+from fulcrum.sim.model.links import is_solid, link_pairs
 from fulcrum.sim.model.object_path import check_supports
 from fulcrum.sim.scenario.contacts import Friction, Hand
 from fulcrum.sim.scenario.robot import Robot
@@ -62,7 +62,12 @@ def compose(scenario: Scenario, motion: ObjectMotion = ObjectMotion.FREE) -> muj
         _add_pairs(spec, scenario)
     scene = _compiled(spec)
     if motion is ObjectMotion.FREE:
-        for first, second in unwanted_pairs(scenario, scene):
+        data = mujoco.MjData(scene)
+        for name, angle in scenario.posture.items():
+            data.joint(name).qpos[:] = angle
+        mujoco.mj_kinematics(scene, data)
+        unwanted = unwanted_pairs(scenario, scene) + object_pairs(scenario)
+        for first, second in unwanted + link_pairs(scenario, scene, data):
             spec.add_pair(geomname1=first, geomname2=second)
     _add_view(spec, scenario)
     return spec
@@ -105,9 +110,19 @@ def unwanted_pairs(scenario: Scenario, scene: mujoco.MjModel) -> list[tuple[str,
     ]
 
 
-def is_solid(geom: Any) -> bool:
-    """Whether a compiled scene's geom may touch others, rather than only show what a link is."""
-    return int(geom.group[0]) != LOOKS
+def object_pairs(scenario: Scenario) -> list[tuple[str, str]]:
+    """Pairs of the object's geoms and the environment's that must not touch.
+
+    Where the object may rest is named, by supports and rests, as a surface for all of its geoms.
+    """
+    named = {s.surface for s in scenario.supports} | {r.surface for r in scenario.rests}
+    return [
+        (own.name, other.name)
+        for other in scenario.environment
+        if other.solid and other.name not in named
+        for own in scenario.object.geoms
+        if own.solid
+    ]
 
 
 def joint_ranges(scene: mujoco.MjModel) -> NDArray[np.float64]:

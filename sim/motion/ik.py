@@ -10,8 +10,9 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from fulcrum.assets import velocity_limits
-from fulcrum.sim.model.collisions import DETECTION, collision_pairs, distance
+from fulcrum.sim.model.collisions import collision_pairs
 from fulcrum.sim.model.contacts import ContactFrames
+from fulcrum.sim.model.links import DETECTION, distance
 from fulcrum.sim.model.object_path import object_path
 from fulcrum.sim.model.scene import ObjectMotion, compose, joint_ranges, tip_geom, tip_site
 from fulcrum.sim.motion.joint_path import JointGrid, JointPath, PathError

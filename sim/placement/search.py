@@ -24,7 +24,7 @@ from scipy.optimize import differential_evolution
 from scipy.stats import qmc
 
 from fulcrum.sim.evaluation.report import Report, Verdict
-from fulcrum.sim.model.collisions import Names
+from fulcrum.sim.model.links import Names
 from fulcrum.sim.motion.joint_path import PathError
 from fulcrum.sim.placement.freedom import Freedom, Moves
 from fulcrum.sim.placement.value import COARSE, FULL, Goal, Value, assess, settled, touching

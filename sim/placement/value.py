@@ -10,10 +10,11 @@ import mujoco
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from fulcrum.sim.model.collisions import Names, distance, overlapping_links
+from fulcrum.sim.model.collisions import overlapping_links
+from fulcrum.sim.model.links import Names, distance, is_solid
 from fulcrum.sim.model.object_path import object_path
 from fulcrum.sim.model.robot_model import RobotModel
-from fulcrum.sim.model.scene import ObjectMotion, compose, is_solid
+from fulcrum.sim.model.scene import ObjectMotion, compose
 from fulcrum.sim.motion.ik import plan_joints
 from fulcrum.sim.motion.joint_path import JointGrid, PathError
 from fulcrum.sim.placement.freedom import rounded, with_posture
