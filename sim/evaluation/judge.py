@@ -161,12 +161,13 @@ class Judge:
                 )
                 failures.append(_failure(trace, used, text))
             peak = float(np.abs(trace.w_commanded_C[:, i, N]).max())
-            allowed_n = limits.force_error * peak
+            hand = i < len(self._scenario.hands)
+            allowed_n = peak * (limits.force_error if hand else limits.support_force_error)
             if peak > 0.0 and not lost.any() and contact.force_error_rms_n > allowed_n:
                 text = (
                     f"Contact {name} followed its commanded normal force only to "
                     f"{contact.force_error_rms_n:.3g} N RMS "
-                    f"(allowed {limits.force_error * peak:.3g} N)."
+                    f"(allowed {allowed_n:.3g} N)."
                 )
                 failures.append(_failure(trace, held_rows, text))
         return failures
@@ -186,7 +187,8 @@ class Judge:
             for wrenches in (history.w_measured_C, trace.w_commanded_C)
         )
         off = _rms(np.linalg.norm(measured - commanded, axis=1))
-        allowed = self._scenario.tolerances.force_error * np.linalg.norm(commanded, axis=1).max()
+        share = self._scenario.tolerances.support_force_error
+        allowed = share * np.linalg.norm(commanded, axis=1).max()
         if off <= allowed:
             return []
         names = " and ".join(self._scenario.contact_names[i] for i in place)

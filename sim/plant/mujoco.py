@@ -10,7 +10,8 @@ import numpy as np
 from dm_control.rl.control import PhysicsError
 
 from fulcrum.sim.model.contacts import rotations
-from fulcrum.sim.model.scene import compose
+from fulcrum.sim.model.scene import compose, pair_materials
+from fulcrum.sim.model.stiffness import set_stiffness
 from fulcrum.sim.plant.centripetal import Centripetal
 from fulcrum.sim.plant.contact_log import ContactLog, ContactReader
 from fulcrum.sim.plant.motion_log import MotionLog
@@ -77,6 +78,7 @@ class MujocoPlant:
         self._warnings, self._ctrl = data.warning.number, data.ctrl
         self._numbers = data.qpos, data.qvel, data.actuator_force
         make_true(model, scenario, world)
+        set_stiffness(model, pair_materials(scenario))
         self.physics.centripetal = Centripetal(scenario, model)
         joints = [int(model.actuator(i).trnid[0]) for i in range(model.nu)]
         self.joints = tuple(model.joint(j).name for j in joints)
