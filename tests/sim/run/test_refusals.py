@@ -305,8 +305,8 @@ def test_a_run_off_the_main_thread_runs():
     short = replace(BOX, phases=stretched(BOX.phases, 5.0))
     with ThreadPoolExecutor(1) as pool:
         report = pool.submit(execute, Request(short, "margin", short.control)).result().report
-    # A 5 s tilt slides by 0.12 mm: it ran, and was judged.
-    assert any("slid" in failure for failure in report.failures)
+    # It ran, and was judged.
+    assert report.tilt.final_deg == pytest.approx(90.0, abs=0.2)
 
 
 def test_time_between_actions_must_be_whole_steps():
