@@ -1,0 +1,168 @@
+"""The plant in Drake: the same scene, world and protocol as MuJoCo's, with contacts solved by SAP."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from dm_control.rl.control import PhysicsError
+from pydrake.multibody.math import SpatialForce
+from pydrake.multibody.plant import (
+    AddMultibodyPlant,
+    ExternallyAppliedSpatialForce,
+    MultibodyPlantConfig,
+)
+from pydrake.systems.analysis import Simulator
+from pydrake.systems.framework import DiagramBuilder
+
+from fulcrum.sim.model.contacts import ContactFrames, rotations
+from fulcrum.sim.model.scene import compose
+from fulcrum.sim.plant.drake_contacts import EDGE, PAD, Compliance, Contacts
+from fulcrum.sim.plant.drake_log import DrakeLog
+from fulcrum.sim.plant.drake_model import Bodies
+from fulcrum.sim.scenario.scenario import Scenario
+from fulcrum.sim.signals.measurement import Measurement
+from fulcrum.sim.signals.trace import Trace
+from fulcrum.sim.world.world import NO_DEVIATION, World
+from fulcrum.synthesis.arrays import Array
+
+
+class DrakePlant:
+    """Steps the scene in Drake; the only class that does.
+
+    Attributes:
+        joints: Names of the driven joints, in the order of the motors.
+    """
+
+    def __init__(
+        self,
+        scenario: Scenario,
+        world: World = NO_DEVIATION,
+        pad: Compliance = PAD,
+        edge: Compliance = EDGE,
+    ) -> None:
+        """Builds the scene.
+
+        Args:
+            scenario: What the plant truly is.
+            world: What its robot truly is; nothing else by default.
+            pad: How the hands' pads yield.
+            edge: How all else yields.
+
+        Raises:
+            InvalidInputError: Scenario or world contradict themselves or each other, or ask for
+                what this plant has not.
+        """
+        scene = compose(scenario).compile()
+        world.change(scenario, scene)
+        drives = [scene.actuator(i) for i in range(scene.nu)]
+        self.joints = tuple(scene.joint(int(drive.trnid[0])).name for drive in drives)
+        self._limits = np.array([drive.ctrlrange for drive in drives]).T
+        self._dt, self._steps = scenario.physics.timestep, 0
+        builder = DiagramBuilder()
+        config = MultibodyPlantConfig(
+            time_step=self._dt,
+            discrete_contact_approximation="sap",
+            contact_model="point",
+        )
+        self._plant, graph = AddMultibodyPlant(config, builder)
+        plant = self._plant
+        bodies = Bodies(plant, scene)
+        contacts = Contacts(plant, scenario, scene, bodies, pad, edge)
+        plant.Finalize()
+        for declaration in contacts.filters():
+            graph.collision_filter_manager().Apply(declaration)
+        self._object = plant.GetBodyByName(scenario.object.name)
+        self._start = scenario.path.start
+        joints = [bodies.joints[name] for name in self.joints]
+        self._q = [joint.position_start() for joint in joints]
+        self._qd = [joint.velocity_start() for joint in joints]
+        self._pose = self._object.floating_positions_start()
+        self._u = [bodies.motors[name].input_start() for name in self.joints]
+        self._tau = np.zeros(len(self.joints))
+        self._actuation = np.zeros(plant.num_actuators())
+        self._simulator = Simulator(builder.Build())
+        self._context = plant.GetMyMutableContextFromRoot(self._simulator.get_mutable_context())
+        instance = self._object.model_instance()
+        if bodies.brakes:
+            still = np.zeros(2 * plant.num_actuators())
+            plant.get_desired_state_input_port(instance).FixValue(self._context, still)
+        self._pushed = False
+        self._log = DrakeLog(scenario, plant, contacts)
+
+    @property
+    def collisions(self) -> dict[tuple[str, str], float]:
+        """Pairs of geoms that touched against the scenario's will, and when first [s]."""
+        return self._log.collisions
+
+    def reset(self, q: Array) -> None:
+        """Puts the robot at rest at joint angles q, (l,), and the object at its start."""
+        plant, context = self._plant, self._context
+        positions, start = np.zeros(plant.num_positions()), self._start
+        positions[self._q] = q
+        quaternion = np.asarray(start.quaternion)
+        positions[self._pose : self._pose + 4] = quaternion / np.linalg.norm(quaternion)
+        positions[self._pose + 4 : self._pose + 7] = start.position
+        self._simulator.get_mutable_context().SetTime(0.0)
+        plant.SetPositions(context, positions)
+        plant.SetVelocities(context, np.zeros(plant.num_velocities()))
+        self._steps = 0
+        self.apply(np.zeros(len(self.joints)), ())
+        self._log.clear()
+        self._simulator.Initialize()
+
+    def measure(self) -> Measurement:
+        """The present state."""
+        q = self._plant.GetPositions(self._context)
+        qd = self._plant.GetVelocities(self._context)
+        at = self._pose
+        turn, p_WO = q[at : at + 4], q[at + 4 : at + 7]
+        quat_WO = turn / np.linalg.norm(turn)  # Drake lets its length drift
+        t = self._steps * self._dt
+        return Measurement(t, q[self._q], qd[self._qd], p_WO, quat_WO, self._tau.copy())
+
+    def apply(self, tau: Array, pushes: Sequence[tuple[Array, Array]] = ()) -> None:
+        """Sets what acts during the next step.
+
+        Args:
+            tau: Motor torques [N·m or N], (l,); cut at their limits.
+            pushes: Points on the object, in its frame [m], and forces there in world axes [N].
+        """
+        self._tau = np.clip(tau, *self._limits)
+        self._actuation[self._u] = self._tau
+        plant = self._plant
+        plant.get_actuation_input_port().FixValue(self._context, self._actuation)
+        if pushes or self._pushed:
+            port = plant.get_applied_spatial_force_input_port()
+            port.FixValue(self._context, [self._force(*push) for push in pushes])
+        self._pushed = bool(pushes)
+
+    def _force(self, p_OA_O: Array, force_W: Array) -> ExternallyAppliedSpatialForce:
+        force = ExternallyAppliedSpatialForce()
+        force.body_index = self._object.index()
+        force.p_BoBq_B = np.asarray(p_OA_O)
+        force.F_Bq_W = SpatialForce(tau=np.zeros(3), f=np.asarray(force_W))
+        return force
+
+    def step(self) -> None:
+        """One physics step, which is logged.
+
+        Raises:
+            PhysicsError: The state has diverged.
+        """
+        self._log.before(self._context)
+        self._steps += 1
+        try:
+            self._simulator.AdvanceTo(self._steps * self._dt)
+        except RuntimeError as error:
+            raise PhysicsError(f"the state has diverged: {error}") from None
+        if not np.isfinite(self._plant.GetPositionsAndVelocities(self._context)).all():
+            raise PhysicsError("the state has diverged.")
+        self._log.after(self._context)
+
+    def contacts(self, block: Trace) -> None:
+        """Fills a block's columns on tips, contacts and the object's twist from what was logged.
+
+        Where a contact is not touched, its place becomes NaN.
+        """
+        self._log.read(block)
