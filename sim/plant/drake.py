@@ -1,11 +1,10 @@
-"""The plant in Drake: the same scene, world and protocol as MuJoCo's, with contacts solved by SAP."""
+"""The plant in Drake: scene, world and protocol are MuJoCo's plant's, contacts are solved by SAP."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 
 import numpy as np
-from dm_control.rl.control import PhysicsError
 from pydrake.multibody.math import SpatialForce
 from pydrake.multibody.plant import (
     AddMultibodyPlant,
@@ -15,12 +14,13 @@ from pydrake.multibody.plant import (
 from pydrake.systems.analysis import Simulator
 from pydrake.systems.framework import DiagramBuilder
 
-from fulcrum.sim.model.contacts import ContactFrames, rotations
 from fulcrum.sim.model.scene import compose
 from fulcrum.sim.plant.drake_contacts import EDGE, PAD, Compliance, Contacts
 from fulcrum.sim.plant.drake_log import DrakeLog
 from fulcrum.sim.plant.drake_model import Bodies
+from fulcrum.sim.plant.protocol import DivergedError
 from fulcrum.sim.scenario.scenario import Scenario
+from fulcrum.sim.signals.force import AppliedForce
 from fulcrum.sim.signals.measurement import Measurement
 from fulcrum.sim.signals.trace import Trace
 from fulcrum.sim.world.world import NO_DEVIATION, World
@@ -41,7 +41,7 @@ class DrakePlant:
         pad: Compliance = PAD,
         edge: Compliance = EDGE,
     ) -> None:
-        """Builds the scene.
+        """Build the scene.
 
         Args:
             scenario: What the plant truly is.
@@ -73,7 +73,7 @@ class DrakePlant:
         for declaration in contacts.filters():
             graph.collision_filter_manager().Apply(declaration)
         self._object = plant.GetBodyByName(scenario.object.name)
-        self._start = scenario.path.start
+        self._start, self._center = scenario.path.start, np.array(scenario.object.center_of_mass)
         joints = [bodies.joints[name] for name in self.joints]
         self._q = [joint.position_start() for joint in joints]
         self._qd = [joint.velocity_start() for joint in joints]
@@ -84,7 +84,7 @@ class DrakePlant:
         self._simulator = Simulator(builder.Build())
         self._context = plant.GetMyMutableContextFromRoot(self._simulator.get_mutable_context())
         instance = self._object.model_instance()
-        if bodies.brakes:
+        if bodies.controlled:
             still = np.zeros(2 * plant.num_actuators())
             plant.get_desired_state_input_port(instance).FixValue(self._context, still)
         self._pushed = False
@@ -96,7 +96,7 @@ class DrakePlant:
         return self._log.collisions
 
     def reset(self, q: Array) -> None:
-        """Puts the robot at rest at joint angles q, (l,), and the object at its start."""
+        """Put the robot at rest at joint angles q, (l,), and the object at its start."""
         plant, context = self._plant, self._context
         positions, start = np.zeros(plant.num_positions()), self._start
         positions[self._q] = q
@@ -107,12 +107,12 @@ class DrakePlant:
         plant.SetPositions(context, positions)
         plant.SetVelocities(context, np.zeros(plant.num_velocities()))
         self._steps = 0
-        self.apply(np.zeros(len(self.joints)), ())
+        self.apply(np.zeros(len(self.joints)))
         self._log.clear()
         self._simulator.Initialize()
 
     def measure(self) -> Measurement:
-        """The present state."""
+        """Return the present state, without noise."""
         q = self._plant.GetPositions(self._context)
         qd = self._plant.GetVelocities(self._context)
         at = self._pose
@@ -121,47 +121,42 @@ class DrakePlant:
         t = self._steps * self._dt
         return Measurement(t, q[self._q], qd[self._qd], p_WO, quat_WO, self._tau.copy())
 
-    def apply(self, tau: Array, pushes: Sequence[tuple[Array, Array]] = ()) -> None:
-        """Sets what acts during the next step.
-
-        Args:
-            tau: Motor torques [N·m or N], (l,); cut at their limits.
-            pushes: Points on the object, in its frame [m], and forces there in world axes [N].
-        """
+    def apply(self, tau: Array, forces: Sequence[AppliedForce] = ()) -> None:
+        """Set torques [N·m or N], (l,), cut at their limits, and forces on the object of a step."""
         self._tau = np.clip(tau, *self._limits)
         self._actuation[self._u] = self._tau
         plant = self._plant
         plant.get_actuation_input_port().FixValue(self._context, self._actuation)
-        if pushes or self._pushed:
+        if forces or self._pushed:
             port = plant.get_applied_spatial_force_input_port()
-            port.FixValue(self._context, [self._force(*push) for push in pushes])
-        self._pushed = bool(pushes)
+            port.FixValue(self._context, [self._external(force) for force in forces])
+        self._pushed = bool(forces)
 
-    def _force(self, p_OA_O: Array, force_W: Array) -> ExternallyAppliedSpatialForce:
-        force = ExternallyAppliedSpatialForce()
-        force.body_index = self._object.index()
-        force.p_BoBq_B = np.asarray(p_OA_O)
-        force.F_Bq_W = SpatialForce(tau=np.zeros(3), f=np.asarray(force_W))
-        return force
+    def _external(self, force: AppliedForce) -> ExternallyAppliedSpatialForce:
+        external = ExternallyAppliedSpatialForce()
+        external.body_index = self._object.index()
+        external.p_BoBq_B = self._center if force.p_OA_O is None else force.p_OA_O
+        external.F_Bq_W = SpatialForce(tau=np.zeros(3), f=force.force_W)
+        return external
 
     def step(self) -> None:
-        """One physics step, which is logged.
+        """Make one physics step, and log it.
 
         Raises:
-            PhysicsError: The state has diverged.
+            DivergedError: The state has left what numbers can hold.
         """
         self._log.before(self._context)
         self._steps += 1
         try:
             self._simulator.AdvanceTo(self._steps * self._dt)
         except RuntimeError as error:
-            raise PhysicsError(f"the state has diverged: {error}") from None
+            raise DivergedError(self._steps * self._dt) from error
         if not np.isfinite(self._plant.GetPositionsAndVelocities(self._context)).all():
-            raise PhysicsError("the state has diverged.")
+            raise DivergedError(self._steps * self._dt)
         self._log.after(self._context)
 
     def contacts(self, block: Trace) -> None:
-        """Fills a block's columns on tips, contacts and the object's twist from what was logged.
+        """Fill a block's columns on tips, contacts and the object's twist from what was logged.
 
         Where a contact is not touched, its place becomes NaN.
         """

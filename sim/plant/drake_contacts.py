@@ -1,9 +1,10 @@
 """What touches in Drake's plant: pads on faces, points of the object on surfaces, links on all.
 
-A hand's ball with torsional friction has no counterpart in Drake. Its pad is a ring of four points at the
-torsion radius, which carries exactly mu e_n per newton of normal force, against a plane on the object's
-face. Corners and rims of the object are spheres of 0.1 mm around the exact points, and the surfaces
-that they touch are lowered by as much: points on planes, without rounded edges.
+Drake has no contact with torsional friction. A hand's ball is a pad instead: a ring of points at
+the torsion radius, which carries mu e_n per newton of normal force about the normal, on two hinges
+in the face, so that it carries no other moment; it touches a plane on the object's face. Corners
+and rims of the object are spheres of 0.1 mm around the exact points, and the surfaces that they
+touch are lowered by as much: points on planes, without rounded edges.
 """
 
 from __future__ import annotations
@@ -36,8 +37,11 @@ from fulcrum.synthesis.arrays import Array
 _POINT = 1e-4
 # Points on the rim of a cylinder's end; a multiple of four, so that those on the axes are exact.
 _RIM = 64
-# Points of a hand's pad, and how far the plane that it touches reaches beyond them [m].
-_RING = 4
+# Points of a hand's pad. SAP lets a point creep in proportion to its force and to how lightly it
+# moves: on a long lever, more of them creep less (0.11 mm of slip with four at 0.5 m).
+_RING, _WIDE_RING = 4, 8
+_WIDE = 0.05  # [m]
+# How far the plane that a pad touches reaches beyond it [m].
 _FACE = 0.2
 # Half the width of what stands for an endless plane [m].
 _PLANE = 10.0
@@ -107,6 +111,7 @@ class Contacts:
         self.names: dict[GeometryId, str] = {}
         self.object_ids: set[GeometryId] = set()
         self.tips: list[Place] = []
+        self.pads: list[Array] = []
         self._ids: list[GeometryId] = []
         # Sets of geometries that may touch each other.
         self._allowed: list[tuple[list[GeometryId], list[GeometryId]]] = []
@@ -130,15 +135,18 @@ class Contacts:
         site, tip = scene.site(tip_site(hand)), scene.geom(tip_geom(hand))
         place = self._bodies.place(int(site.bodyid[0]), site.pos, site.quat)
         self.tips.append(place)
-        radius, depth = hand.friction.e_n, float(tip.size[0])
-        angles = 2.0 * np.pi * np.arange(_RING) / _RING
-        points = [[radius * np.cos(a), radius * np.sin(a), depth] for a in angles] if radius else []
-        points = points or [[0.0, 0.0, depth]]
-        share = Compliance(compliance.stiffness / len(points), compliance.relaxation_s)
+        self.pads.append(np.array([0.0, 0.0, tip.size[0]]))
+        radius = hand.friction.e_n or 0.0
+        count = (_WIDE_RING if radius > _WIDE else _RING) if radius else 1
+        angles = 2.0 * np.pi * np.arange(count) / count
+        points = radius * np.array([np.cos(angles), np.sin(angles), 0.0 * angles]).T
+        share = Compliance(compliance.stiffness / count, compliance.relaxation_s)
+        at = place.X_BG @ RigidTransform([0.0, 0.0, float(tip.size[0])])
+        pad = self._bodies.add_pad(hand.name, Place(place.body, at))
         ring = [
             self._add(
-                place.body,
-                place.X_BG @ RigidTransform(point),
+                pad,
+                RigidTransform(point),
                 geometry.Sphere(_POINT),
                 f"{hand.name}/{j}",
                 hand.friction,
@@ -149,12 +157,10 @@ class Contacts:
         R_OC = contact_axes(hand.normal_O, hand.tangent_O)
         outward = RotationMatrix(R_OC @ np.diag([1.0, -1.0, -1.0]))
         p_OF = np.asarray(hand.p_OC_O) + _POINT * np.asarray(hand.normal_O)
-        reach = (radius or 0.0) + _FACE
+        reach = radius + _FACE
         slab, X_FS = _slab(reach, reach)
         X_OS = RigidTransform(outward, p_OF) @ X_FS
-        face = self._add(
-            self._thing.body, X_OS, slab, f"{hand.name}/face", hand.friction, share
-        )
+        face = self._add(self._thing.body, X_OS, slab, f"{hand.name}/face", hand.friction, share)
         self.object_ids.add(face)
         for point in ring:
             self.touches[point] = Touch(i)
@@ -164,8 +170,10 @@ class Contacts:
         """Points of the object, for each pair of a geom of it and a surface that it may touch."""
         scenario = self._scenario
         pairs: dict[tuple[str, str], Friction] = {}
-        for placed in (*scenario.supports, *scenario.rests):
-            pairs.setdefault((placed.geom, placed.surface), placed.friction)
+        for support in scenario.supports:
+            pairs.setdefault((support.geom, support.surface), support.friction)
+        for rest in scenario.rests:
+            pairs.setdefault((rest.geom, rest.surface), rest.friction)
         for (name, surface), friction in pairs.items():
             known = [
                 (len(scenario.hands) + i, np.asarray(support.p_OP_O))
@@ -175,14 +183,15 @@ class Contacts:
             shape, X_WS = _solid(self._geoms[surface], _POINT)
             world, label = self._plant.world_body(), f"{surface}/{name}"
             below = self._add(world, X_WS, shape, label, friction, self._edge)
-            ids = []
+            ids, near = [], _reach(self._geoms[name])
             for j, (shape, X_OP) in enumerate(_points(self._geoms[name])):
                 label = f"{name}/{surface}/{j}"
                 point = self._add(self._thing.body, X_OP, shape, label, friction, self._edge)
-                near = [
-                    i for i, at in known if np.linalg.norm(X_OP.translation() - at) < _SAME_POINT
-                ]
-                self.touches[point] = Touch(near[0] if near else -1)
+                distances = {i: np.linalg.norm(X_OP.translation() - at) for i, at in known}
+                nearest = min(distances, key=lambda i: distances[i], default=-1)
+                self.touches[point] = Touch(
+                    nearest if distances.get(nearest, np.inf) < near else -1
+                )
                 self.object_ids.add(point)
                 ids.append(point)
             self._allowed.append((ids, [below]))
@@ -225,7 +234,7 @@ class Contacts:
         friction: Friction,
         compliance: Compliance,
     ) -> GeometryId:
-        """Registers a geometry; of two that touch both are as given, so each yields half."""
+        """Register a geometry; of two that touch both are as given, so each yields half."""
         properties = geometry.ProximityProperties()
         geometry.AddContactMaterial(
             dissipation=0.0,
@@ -281,6 +290,14 @@ def _hull(name: str, vertices: Array) -> Posed:
     lines += [f"f {i} {i + 1} {i + 2}" for i in range(1, len(lines) - 1)]
     file = MemoryFile("\n".join([*lines, ""]), ".obj", name)
     return geometry.Convex(geometry.InMemoryMesh(mesh_file=file), 1.0), RigidTransform()
+
+
+def _reach(geom: Geom) -> float:
+    """How far from an environment contact what touches still belongs to it [m].
+
+    A rim that comes to stand touches along an arc: up to a quarter of it on either side.
+    """
+    return 1.4 * geom.size[0] if geom.kind == "cylinder" else _SAME_POINT
 
 
 def _points(geom: Geom) -> Iterator[Posed]:

@@ -1,7 +1,7 @@
 """A compiled scene's robots and object as bodies and joints of Drake's MultibodyPlant.
 
-They are read off MuJoCo's compiled model, as the controller's Pinocchio model is, so that any URDF or
-MJCF serves both engines, and what a world changes in the compiled model holds here, too.
+They are read off MuJoCo's compiled model, as the controller's Pinocchio model is, so that any URDF
+or MJCF serves both engines, and what a world changes in the compiled model holds here, too.
 """
 
 from __future__ import annotations
@@ -29,6 +29,11 @@ from fulcrum.synthesis.arrays import Array
 
 # Dry friction is a brake: damping so large that it sticks, with a limited torque [N·m·s/rad].
 _BRAKE_DAMPING = 1e3
+# A pad's mass [kg] and size [m], which do not matter; the inertia of its hinges [kg·m²], so that SAP
+# does not regularise its contacts by how light it is; and a spring of a few newton millimetres.
+_PAD_SPHERE = (1e-4, 0.01)
+_PAD_INERTIA = 0.05
+_PAD_GAINS = PdControllerGains(p=0.5, d=0.3)
 _JOINTS = {
     int(mujoco.mjtJoint.mjJNT_HINGE): RevoluteJoint,
     int(mujoco.mjtJoint.mjJNT_SLIDE): PrismaticJoint,
@@ -51,11 +56,11 @@ class Bodies:
     Attributes:
         joints: Drake's joints by name.
         motors: One actuator for each joint, which carries its armature, by name.
-        brakes: The actuators that are the dry friction of those joints that have some.
+        controlled: Whether there are actuators with gains: dry friction, or pads.
     """
 
     def __init__(self, plant: MultibodyPlant, scene: mujoco.MjModel) -> None:
-        """Adds the bodies.
+        """Add the bodies.
 
         Raises:
             InvalidInputError: A joint is of a kind, or has a spring, that is not modelled here.
@@ -63,7 +68,7 @@ class Bodies:
         self._plant, self._scene = plant, scene
         self.joints: dict[str, RevoluteJoint | PrismaticJoint] = {}
         self.motors: dict[str, JointActuator] = {}
-        self.brakes: list[JointActuator] = []
+        self.controlled = False
         # Of each of the scene's bodies the one that it moves with, and its pose there.
         self._carriers = {0: (0, RigidTransform())}
         for body in range(1, scene.nbody):
@@ -80,6 +85,22 @@ class Bodies:
         carrier, X_LB = self._carriers[body]
         return Place(self._links[carrier], X_LB @ pose(position, quaternion))
 
+    def add_pad(self, name: str, place: Place) -> RigidBody:
+        """A body on two hinges, about x and y of a place, that is held upright by a weak spring."""
+        plant, parent = self._plant, place.body
+        frame = plant.AddFrame(FixedOffsetFrame(f"{name}/pad", parent.body_frame(), place.X_BG))
+        for axis in np.eye(3)[:2]:
+            label = f"{name}/pad/{'xy'[int(axis[1])]}"
+            body = plant.AddRigidBody(label, SpatialInertia.SolidSphereWithMass(*_PAD_SPHERE))
+            joint = plant.AddJoint(RevoluteJoint(label, frame, body.body_frame(), axis, 0.0))
+            spring = plant.AddJointActuator(label, joint)
+            spring.set_default_rotor_inertia(_PAD_INERTIA)
+            spring.set_default_gear_ratio(1.0)
+            spring.set_controller_gains(_PAD_GAINS)
+            frame = body.body_frame()
+        self.controlled = True
+        return body
+
     def _carrier(self, body: int) -> tuple[int, RigidTransform]:
         scene = self._scene
         count = int(scene.body_jntnum[body])
@@ -93,7 +114,7 @@ class Bodies:
 
     def _inertias(self) -> dict[int, SpatialInertia]:
         """Of everything that moves as one, about the origin and in the axes of its carrier."""
-        scene, sums = self._scene, {}
+        scene, sums = self._scene, dict[int, SpatialInertia]()
         for body, (carrier, X_LB) in self._carriers.items():
             mass = float(scene.body_mass[body])
             if mass <= 0.0:
@@ -107,7 +128,7 @@ class Bodies:
         return {body: sums.get(body, SpatialInertia.Zero()) for body in range(scene.nbody)}
 
     def _add(self, body: int, inertia: SpatialInertia) -> None:
-        """Adds one of the scene's bodies that have joints of their own."""
+        """Add one of the scene's bodies that have joints of their own."""
         scene, plant = self._scene, self._plant
         name, first = scene.body(body).name, int(scene.body_jntadr[body])
         link = plant.AddRigidBody(name, inertia)
@@ -126,7 +147,7 @@ class Bodies:
         self._join(last, parent, at @ RigidTransform(scene.jnt_pos[last]), link)
 
     def _join(self, j: int, parent: RigidBody, X_PF: RigidTransform, child: RigidBody) -> None:
-        """Adds one of the scene's joints, with damping, limits, armature and dry friction."""
+        """Add one of the scene's joints, with damping, limits, armature and dry friction."""
         scene, plant = self._scene, self._plant
         name, dof, kind = scene.joint(j).name, int(scene.jnt_dofadr[j]), int(scene.jnt_type[j])
         if kind not in _JOINTS:
@@ -149,7 +170,7 @@ class Bodies:
         if friction > 0.0:
             brake = plant.AddJointActuator(f"{name}/brake", joint, friction)
             brake.set_controller_gains(PdControllerGains(p=0.0, d=_BRAKE_DAMPING))
-            self.brakes.append(brake)
+            self.controlled = True
 
 
 def pose(position: Array, quaternion: Array) -> RigidTransform:
