@@ -1,4 +1,4 @@
-"""The plant in Drake: scene, world and protocol are MuJoCo's plant's, contacts are solved by SAP."""
+"""The plant in Drake: scene, world and protocol are as with MuJoCo, contacts are solved by SAP."""
 
 from __future__ import annotations
 
@@ -15,10 +15,11 @@ from pydrake.systems.analysis import Simulator
 from pydrake.systems.framework import DiagramBuilder
 
 from fulcrum.sim.model.scene import compose
-from fulcrum.sim.plant.drake_contacts import EDGE, PAD, Compliance, Contacts
+from fulcrum.sim.plant.drake_contacts import EDGE, PAD, Contacts
 from fulcrum.sim.plant.drake_log import DrakeLog
 from fulcrum.sim.plant.drake_model import Bodies
 from fulcrum.sim.plant.protocol import DivergedError
+from fulcrum.sim.scenario.material import ContactMaterial
 from fulcrum.sim.scenario.scenario import Scenario
 from fulcrum.sim.signals.force import AppliedForce
 from fulcrum.sim.signals.measurement import Measurement
@@ -38,16 +39,16 @@ class DrakePlant:
         self,
         scenario: Scenario,
         world: World = NO_DEVIATION,
-        pad: Compliance = PAD,
-        edge: Compliance = EDGE,
+        pad: ContactMaterial = PAD,
+        edge: ContactMaterial = EDGE,
     ) -> None:
         """Build the scene.
 
         Args:
             scenario: What the plant truly is.
             world: What its robot truly is; nothing else by default.
-            pad: How the hands' pads yield.
-            edge: How all else yields.
+            pad: What the hands' pads are made of.
+            edge: What all else is made of.
 
         Raises:
             InvalidInputError: Scenario or world contradict themselves or each other, or ask for

@@ -10,7 +10,6 @@ touch are lowered by as much: points on planes, without rounded edges.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
 from itertools import product
 from typing import Any, TypeAlias
 
@@ -27,9 +26,10 @@ from scipy.spatial import ConvexHull
 from fulcrum.sim.geometry.geom import Geom
 from fulcrum.sim.geometry.mesh import read_mesh
 from fulcrum.sim.model.contacts import contact_axes
-from fulcrum.sim.model.scene import tip_geom, tip_site, unwanted_pairs
+from fulcrum.sim.model.scene import tip_geom, tip_site
 from fulcrum.sim.plant.drake_model import Bodies, Place, pose
 from fulcrum.sim.scenario.contacts import Friction
+from fulcrum.sim.scenario.material import ContactMaterial
 from fulcrum.sim.scenario.scenario import Scenario
 from fulcrum.synthesis.arrays import Array
 
@@ -54,44 +54,21 @@ _UNWANTED = Friction(0.5)
 Posed: TypeAlias = tuple[geometry.Shape, RigidTransform]
 
 
-@dataclass(frozen=True)
-class Compliance:
-    """How a contact yields.
-
-    Attributes:
-        stiffness: Normal force over depth [N/m].
-        relaxation_s: Damping over stiffness [s].
-    """
-
-    stiffness: float
-    relaxation_s: float
-
-
-# A rubber ball of 30 mm at 2 MPa; an edge of wood or cardboard.
-PAD = Compliance(4e4, 2e-3)
-EDGE = Compliance(4e5, 5e-3)
-
-
-@dataclass(frozen=True)
-class Touch:
-    """What a geometry that touches stands for.
-
-    Attributes:
-        contact: Index of the scenario's contact; -1 for a place of rest, which is none.
-        link: The scene's geom if its contacts are not wanted.
-    """
-
-    contact: int = -1
-    link: str = ""
+# What contacts are made of: a rubber ball of 30 mm at 2 MPa; an edge of wood or cardboard.
+PAD = ContactMaterial(4e4, 2e-3)
+EDGE = ContactMaterial(4e5, 5e-3)
 
 
 class Contacts:
     """Everything that may touch, registered in a plant that is not yet finalised.
 
     Attributes:
-        touches: What the geometries stand for that are not of the object or the environment.
-        names: The scene's geom of each geometry that links may touch.
+        wanted: Geometries of hands and object that may touch, and the index of the scenario's
+            contact that each stands for; -1 for a place of rest, which is none.
+        names: The scene's geom of each geometry that must not touch.
         object_ids: Geometries of the object.
+        tips: Where the hands' tips are.
+        pads: Where the pads are, in the axes of the tips [m].
     """
 
     def __init__(
@@ -100,14 +77,14 @@ class Contacts:
         scenario: Scenario,
         scene: mujoco.MjModel,
         bodies: Bodies,
-        pad: Compliance = PAD,
-        edge: Compliance = EDGE,
+        pad: ContactMaterial = PAD,
+        edge: ContactMaterial = EDGE,
     ) -> None:
         self._plant, self._scenario, self._scene = plant, scenario, scene
         self._bodies, self._edge = bodies, edge
         self._thing = bodies.place(scene.body(scenario.object.name).id, np.zeros(3), _UNTURNED)
         self._geoms = {geom.name: geom for geom in (*scenario.object.geoms, *scenario.environment)}
-        self.touches: dict[GeometryId, Touch] = {}
+        self.wanted: dict[GeometryId, int] = {}
         self.names: dict[GeometryId, str] = {}
         self.object_ids: set[GeometryId] = set()
         self.tips: list[Place] = []
@@ -118,7 +95,7 @@ class Contacts:
         for i in range(len(scenario.hands)):
             self._add_pad(i, pad)
         self._add_supports()
-        self._add_links()
+        self._add_unwanted()
 
     def filters(self) -> list[CollisionFilterDeclaration]:
         """What may touch what; to be applied in order."""
@@ -129,7 +106,7 @@ class Contacts:
             filters.append(CollisionFilterDeclaration().AllowBetween(*between))
         return filters
 
-    def _add_pad(self, i: int, compliance: Compliance) -> None:
+    def _add_pad(self, i: int, material: ContactMaterial) -> None:
         """The ring of points of a hand, and the plane that it touches."""
         hand, scene = self._scenario.hands[i], self._scene
         site, tip = scene.site(tip_site(hand)), scene.geom(tip_geom(hand))
@@ -140,7 +117,7 @@ class Contacts:
         count = (_WIDE_RING if radius > _WIDE else _RING) if radius else 1
         angles = 2.0 * np.pi * np.arange(count) / count
         points = radius * np.array([np.cos(angles), np.sin(angles), 0.0 * angles]).T
-        share = Compliance(compliance.stiffness / count, compliance.relaxation_s)
+        share = ContactMaterial(material.stiffness / count, material.damping_s)
         at = place.X_BG @ RigidTransform([0.0, 0.0, float(tip.size[0])])
         pad = self._bodies.add_pad(hand.name, Place(place.body, at))
         ring = [
@@ -163,7 +140,7 @@ class Contacts:
         face = self._add(self._thing.body, X_OS, slab, f"{hand.name}/face", hand.friction, share)
         self.object_ids.add(face)
         for point in ring:
-            self.touches[point] = Touch(i)
+            self.wanted[point] = i
         self._allowed.append((ring, [face]))
 
     def _add_supports(self) -> None:
@@ -189,32 +166,30 @@ class Contacts:
                 point = self._add(self._thing.body, X_OP, shape, label, friction, self._edge)
                 distances = {i: np.linalg.norm(X_OP.translation() - at) for i, at in known}
                 nearest = min(distances, key=lambda i: distances[i], default=-1)
-                self.touches[point] = Touch(
-                    nearest if distances.get(nearest, np.inf) < near else -1
-                )
+                close = distances.get(nearest, np.inf) < near
+                self.wanted[point] = nearest if close else -1
                 self.object_ids.add(point)
                 ids.append(point)
             self._allowed.append((ids, [below]))
 
-    def _add_links(self) -> None:
-        """What must not touch: moving links against solid object and environment."""
-        pairs = unwanted_pairs(self._scenario, self._scene)
-        ids: dict[str, GeometryId] = {}
-        for name in dict.fromkeys(n for pair in pairs for n in pair):
-            geom = self._scene.geom(name)
-            place = self._bodies.place(int(geom.bodyid[0]), geom.pos, geom.quat)
-            shape, X_GS = self._compiled(geom)
-            X_BS = place.X_BG @ X_GS
-            ids[name] = self._add(place.body, X_BS, shape, name, _UNWANTED, self._edge)
-            self.names[ids[name]] = name
-            if place.body.index() == self._thing.body.index():
-                self.object_ids.add(ids[name])
-        others: dict[str, list[GeometryId]] = {}
-        for link, other in pairs:
-            others.setdefault(link, []).append(ids[other])
-        for link, against in others.items():
-            self.touches[ids[link]] = Touch(link=link)
-            self._allowed.append(([ids[link]], against))
+    def _add_unwanted(self) -> None:
+        """What must not touch: the scene's pairs without a name."""
+        scene, ids = self._scene, dict[int, GeometryId]()
+        for pair in (i for i in range(scene.npair) if not scene.pair(i).name):
+            both = int(scene.pair_geom1[pair]), int(scene.pair_geom2[pair])
+            for index in both:
+                if index not in ids:
+                    ids[index] = self._add_unwanted_geom(scene.geom(index))
+            self._allowed.append(([ids[both[0]]], [ids[both[1]]]))
+
+    def _add_unwanted_geom(self, geom: Any) -> GeometryId:
+        place = self._bodies.place(int(geom.bodyid[0]), geom.pos, geom.quat)
+        shape, X_GS = self._compiled(geom)
+        own = self._add(place.body, place.X_BG @ X_GS, shape, geom.name, _UNWANTED, self._edge)
+        self.names[own] = geom.name
+        if place.body.index() == self._thing.body.index():
+            self.object_ids.add(own)
+        return own
 
     def _compiled(self, geom: Any) -> Posed:
         """The shape of one of the compiled scene's geoms."""
@@ -232,17 +207,17 @@ class Contacts:
         shape: geometry.Shape,
         name: str,
         friction: Friction,
-        compliance: Compliance,
+        material: ContactMaterial,
     ) -> GeometryId:
         """Register a geometry; of two that touch both are as given, so each yields half."""
         properties = geometry.ProximityProperties()
         geometry.AddContactMaterial(
             dissipation=0.0,
-            point_stiffness=2.0 * compliance.stiffness,
+            point_stiffness=2.0 * material.stiffness,
             friction=CoulombFriction(friction.mu, friction.mu),
             properties=properties,
         )
-        properties.AddProperty("material", "relaxation_time", compliance.relaxation_s / 2.0)
+        properties.AddProperty("material", "relaxation_time", material.damping_s / 2.0)
         own = self._plant.RegisterCollisionGeometry(body, X_BG, shape, name, properties)
         self._ids.append(own)
         return own

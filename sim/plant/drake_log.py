@@ -59,24 +59,21 @@ class DrakeLog:
     def after(self, context: Context) -> None:
         """Keep the contacts of the step that was just made."""
         results = self._plant.get_contact_results_output_port().Eval(context)
-        touches, ours, step = (
-            self._contacts.touches,
-            self._contacts.object_ids,
-            len(self._collisions),
-        )
+        wanted, ours = self._contacts.wanted, self._contacts.object_ids
+        step = len(self._collisions)
         unwanted = 0
         for i in range(results.num_point_pair_contacts()):
             info = results.point_pair_contact_info(i)
             pair = info.point_pair()
             first, second = pair.id_A, pair.id_B
-            touch = touches.get(first) or touches[second]
-            if touch.link:
+            contact = wanted.get(first, wanted.get(second))
+            if contact is None:
                 unwanted += 1
                 self._collide(first, second, context.get_time() - self._dt)
-            elif touch.contact >= 0:
+            elif contact >= 0:
                 # The force is that on the body of the second.
                 force = info.contact_force() if second in ours else -info.contact_force()
-                self._rows.append((step, touch.contact, force, info.contact_point()))
+                self._rows.append((step, contact, force, info.contact_point()))
         self._collisions.append(unwanted)
 
     def _collide(self, first: object, second: object, t: float) -> None:

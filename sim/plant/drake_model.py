@@ -29,8 +29,8 @@ from fulcrum.synthesis.arrays import Array
 
 # Dry friction is a brake: damping so large that it sticks, with a limited torque [N·m·s/rad].
 _BRAKE_DAMPING = 1e3
-# A pad's mass [kg] and size [m], which do not matter; the inertia of its hinges [kg·m²], so that SAP
-# does not regularise its contacts by how light it is; and a spring of a few newton millimetres.
+# A pad's mass [kg] and size [m], which do not matter; the inertia of its hinges [kg·m²], so that
+# SAP does not regularise its contacts by how light it is; and a spring of a few N·mm.
 _PAD_SPHERE = (1e-4, 0.01)
 _PAD_INERTIA = 0.05
 _PAD_GAINS = PdControllerGains(p=0.5, d=0.3)

@@ -19,6 +19,7 @@ from fulcrum.sim.evaluation.judge import Judge
 from fulcrum.sim.evaluation.monitor import ContactHistory, Monitor
 from fulcrum.sim.evaluation.report import Report, RunInfo
 from fulcrum.sim.planning.execution import Planning
+from fulcrum.sim.plant.engines import Engine
 from fulcrum.sim.recording import Recorder, open_viewer
 from fulcrum.sim.run.files import check_new_folder, finite, write_json
 from fulcrum.sim.run.loop import ClosedLoop, DivergedError
@@ -50,6 +51,7 @@ class Request:
         anyway: Whether to run although the synthesis finds no forces somewhere on the path.
         world: What is true of the plant beyond the scenario; nothing else by default.
         planning: How the tilt is planned; None for the scenario's own timing.
+        engine: What simulates the plant.
     """
 
     scenario: Scenario
@@ -61,6 +63,7 @@ class Request:
     anyway: bool = False
     world: World = NO_DEVIATION
     planning: Planning | None = None
+    engine: Engine = Engine.MUJOCO
 
     def __post_init__(self) -> None:
         _ = self.settings  # a name that stands for none is refused
@@ -133,6 +136,7 @@ def execute(
         world=request.world,
         grip=prepared.grip,
         replanner=replanner,
+        engine=request.engine,
     )
     monitor = Monitor(loop.truth)
     robot = loop.robot

@@ -16,7 +16,7 @@ from fulcrum.sim.model.robot import RobotModel
 from fulcrum.sim.motion.ik import plan_joints
 from fulcrum.sim.motion.joint_path import JointPath
 from fulcrum.sim.planning.robust_grip import plan_grip
-from fulcrum.sim.plant.mujoco import Plant
+from fulcrum.sim.plant.engines import Engine, make_plant
 from fulcrum.sim.scenario.control import Control
 from fulcrum.sim.scenario.scenario import Scenario
 from fulcrum.sim.signals.event import Event
@@ -57,6 +57,7 @@ class ClosedLoop:
         world: World = NO_DEVIATION,
         grip: GripSchedule | None = None,
         replanner: Replanner | None = None,
+        engine: Engine = Engine.MUJOCO,
     ) -> None:
         """Plans the joint path, if need be, and sets up plant and controller.
 
@@ -69,6 +70,7 @@ class ClosedLoop:
             world: How the plant deviates from that, and what disturbs it; nothing by default.
             grip: What the control's robustness asks for, where it is planned already.
             replanner: Plans the rest of a planned tilt anew where need be.
+            engine: What simulates the plant.
 
         Raises:
             InvalidInputError: The world does not fit the scenario.
@@ -84,7 +86,7 @@ class ClosedLoop:
         self._controller = Controller(
             scenario, control, robot, joint_path, Channel(world), grip, replanner
         )
-        self._plant = Plant(self.truth, world)
+        self._plant = make_plant(engine, self.truth, world)
         self._sensors = Sensors(world, self._plant.joints)
         deviation = np.random.default_rng(seed).normal(size=len(robot.joints))
         try:
