@@ -17,6 +17,7 @@ from fulcrum.scenarios.commands.common import (
     INTERRUPTED,
     Chosen,
 )
+from fulcrum.scenarios.commands.crosscheck import Crosscheck
 from fulcrum.scenarios.commands.explain import Capacity, Explain
 from fulcrum.scenarios.commands.list import List
 from fulcrum.scenarios.commands.new import New
@@ -45,6 +46,7 @@ Command = (
     | Annotated[Place, tyro.conf.subcommand("place")]
     | Annotated[Plan, tyro.conf.subcommand("plan")]
     | Annotated[Reproduce, tyro.conf.subcommand("reproduce")]
+    | Annotated[Crosscheck, tyro.conf.subcommand("crosscheck")]
     | Annotated[Sweep, tyro.conf.subcommand("sweep")]
 )
 
@@ -85,6 +87,7 @@ def _parse(
     | Place
     | Plan
     | Reproduce
+    | Crosscheck
     | Sweep
 ):
     """The command asked for; a parse error leaves as one line instead of tyro's box."""

@@ -16,6 +16,7 @@ import tyro
 
 if TYPE_CHECKING:
     from fulcrum.sim.planning.execution import Planning
+    from fulcrum.sim.plant.engines import Engine
     from fulcrum.sim.scenario.control import Control
     from fulcrum.sim.scenario.scenario import Scenario
 
@@ -96,6 +97,19 @@ def one_of(kind: type[Kind], option: str, text: str) -> Kind:
     if text not in list(kind):
         raise InvalidInputError(option, text, f"one of {', '.join(kind)}")
     return kind(text)
+
+
+def chosen_engine(name: str) -> Engine:
+    """Return the engine that ``--engine`` names.
+
+    Raises:
+        InvalidInputError: It names none, or one that is not installed.
+    """
+    from fulcrum.sim.plant.engines import Engine, check_installed
+
+    engine = one_of(Engine, "--engine", name)
+    check_installed(engine)
+    return engine
 
 
 def chosen_planning(

@@ -12,6 +12,7 @@ from fulcrum.scenarios.commands.common import (
     PASSED,
     Chosen,
     chosen_control,
+    chosen_engine,
     chosen_planning,
     progress_bar,
     results_folder,
@@ -55,6 +56,9 @@ class Run(Chosen):
 
     world: str = ""
     """What to set of the world that was drawn, like friction=0.8,mass=1.1 (factors)."""
+
+    engine: str = "mujoco"
+    """What simulates the plant: mujoco or drake (which needs the extra `drake`)."""
 
     out: Path | None = None
     """New or empty folder for the results; logs/SCENARIO-CONTROLLER-TIME if left out."""
@@ -127,7 +131,7 @@ class Run(Chosen):
         request = Request(
             chosen, controller, control, self.seed, out, self.live, self.anyway, world, planning
         )
-        return request, prepared
+        return replace(request, engine=chosen_engine(self.engine)), prepared
 
 
 def _print_report(report: Report, out: Path) -> None:
