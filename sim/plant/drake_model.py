@@ -28,7 +28,7 @@ from fulcrum.synthesis import InvalidInputError
 from fulcrum.synthesis.arrays import Array
 
 # Dry friction is a brake: damping so large that it sticks, with a limited torque [N·m·s/rad].
-_BRAKE_DAMPING = 1e3
+_BRAKE_DAMPING = 1e5
 # A pad's mass [kg] and size [m], which do not matter; the inertia of its hinges [kg·m²], so that
 # SAP does not regularise its contacts by how light it is; and a spring of a few N·mm.
 _PAD_SPHERE = (1e-4, 0.01)

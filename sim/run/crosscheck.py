@@ -8,9 +8,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from fulcrum.sim.evaluation.report import Verdict
+from fulcrum.sim.motion.schedule import Schedule
 from fulcrum.sim.plant.engines import Engine, check_installed
 from fulcrum.sim.run.execute import Progress, Request, Result, execute
 from fulcrum.sim.run.preparation import Preparation, prepare
+from fulcrum.sim.scenario.scenario import Scenario
 from fulcrum.sim.world.world import World
 from fulcrum.synthesis.arrays import N, T
 
@@ -66,7 +68,7 @@ class Bounds:
 
 @dataclass(frozen=True)
 class ContactDifference:
-    """How one contact differs, over the time that both runs last.
+    """How one contact differs, as long as the object is held with full grip.
 
     Attributes:
         normal_rms_n: RMS of the difference of the normal forces [N].
@@ -152,7 +154,7 @@ def crosscheck(
         for variant in variants:
             result = run_variant(own, variant, prepared)
             reference = comparisons[0].result if comparisons else result
-            comparisons.append(compare(variant, result, reference, len(own.scenario.hands), bounds))
+            comparisons.append(compare(variant, result, reference, own.scenario, bounds))
             done += 1
             if progress is not None:
                 progress(done, total)
@@ -177,12 +179,16 @@ def run_variant(request: Request, variant: Variant, prepared: Preparation) -> Re
 
 
 def compare(
-    variant: Variant, result: Result, reference: Result, hands: int, bounds: Bounds
+    variant: Variant, result: Result, reference: Result, scenario: Scenario, bounds: Bounds
 ) -> Comparison:
-    """Compare a run with the reference, of the same scenario with so many hands."""
+    """Compare a run of a scenario with the reference, forces as long as there is full grip.
+
+    Before and after that the object stands on more than the contacts that have names.
+    """
     ours, theirs = result.history.w_OC_C, reference.history.w_OC_C
     rows = min(len(ours), len(theirs))
-    off = ours[:rows] - theirs[:rows]
+    held = Schedule(scenario).held[reference.trace.phase[:rows].astype(int)]
+    off = (ours[:rows] - theirs[:rows])[held] if held.any() else ours[:rows] - theirs[:rows]
     normal = np.sqrt(np.mean(off[..., N] ** 2, axis=0)).tolist()
     across = np.sqrt(np.mean(np.sum(off[..., T:N] ** 2, axis=-1), axis=0)).tolist()
     peaks = theirs[..., N].max(axis=0).tolist()
@@ -190,7 +196,7 @@ def compare(
         name: ContactDifference(normal[i], peaks[i], across[i], contact.slip_mm)
         for i, (name, contact) in enumerate(result.report.contacts.items())
     }
-    found = _disagreements(result, reference, contacts, hands, bounds)
+    found = _disagreements(result, reference, contacts, len(scenario.hands), bounds)
     return Comparison(variant, result, contacts, tuple(found))
 
 

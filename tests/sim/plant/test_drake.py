@@ -103,9 +103,9 @@ def test_dry_friction_holds_a_joint(share, moves):
     ROBOT.update(START)
     _, block = resting(world, steps=100, tau=ROBOT.gravity() + push)
     # 0.4 N m move some kg m^2 for 0.1 s.
-    assert (abs(block.qd[-1, 0]) > 5e-3) is moves
+    assert bool(abs(block.qd[-1, 0]) > 5e-3) is moves
     if not moves:
-        assert abs(block.qd[-1, 0]) < 2.1 * dry / 1e3  # damping of the brake
+        assert abs(block.qd[-1, 0]) < 2.1 * dry / 1e5  # damping of the brake
 
 
 def test_the_same_torques_give_the_same_run():
