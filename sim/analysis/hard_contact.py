@@ -9,7 +9,8 @@ cone K, are those at which no contact accelerates into the other body or slips i
 
 (with De Saxce's correction of g). There is neither stiffness nor regularisation in it. Where
 columns of G depend on each other, as along the line between two supports of a rigid object, forces
-are not determined; those components are marked.
+are not determined; those components are marked. What slides or bounces is not told from what
+sticks: the comparison is one for contacts that hold.
 """
 
 from __future__ import annotations
@@ -33,9 +34,9 @@ from fulcrum.synthesis.arrays import M_N, Array, Mask, N
 _H = 1e-5
 # Of the largest eigenvalue of G: below, a combination of forces moves nothing.
 _RANK = 1e-9
-_TOLERANCE = 1e-9
+_TOLERANCE = 1e-7
 _EVERY_S = 0.1
-_ITERATIONS = 2000
+_ITERATIONS = 10_000
 
 
 @dataclass(frozen=True, eq=False)

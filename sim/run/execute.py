@@ -232,6 +232,7 @@ def resolved_config(request: Request) -> dict[str, Any]:
     return finite(
         {
             "controller": request.name,
+            "engine": request.engine.value,
             "seed": request.seed,
             "control": dataclasses.asdict(request.settings),
             "scenario": dataclasses.asdict(request.scenario),

@@ -4,9 +4,12 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+import trimesh
 
 from fulcrum.scenarios import scenario
 from fulcrum.sim.geometry.object import GRAVITY
+from fulcrum.sim.geometry.shape import homogeneous
+from fulcrum.sim.geometry.shapes import MeshShape
 from fulcrum.sim.model.robot import RobotModel
 from fulcrum.sim.motion.ik import plan_joints
 from fulcrum.sim.scenario.material import ContactMaterial
@@ -26,9 +29,9 @@ START = plan_joints(PANDA).start
 CONTACTS = len(PANDA.contact_names)
 
 
-def resting(world=NO_DEVIATION, steps=200, forces=(), edge=EDGE, tau=None):
+def resting(world=NO_DEVIATION, steps=200, forces=(), edge=EDGE, tau=None, believed=PANDA):
     """The plant after some steps with the arms held up, and the block of these steps."""
-    plant = DrakePlant(world.truth(PANDA), world, edge=edge)
+    plant = DrakePlant(world.truth(believed), world, edge=edge)
     plant.reset(START)
     block = Trace.allocate(steps, len(START), len(PANDA.hands), CONTACTS)
     for row in range(steps):
@@ -56,6 +59,35 @@ def test_the_depth_is_force_over_stiffness(stiffness):
     _, block = resting(edge=ContactMaterial(stiffness, 5e-3))
     depth = PANDA.path.start.position[2] - block.p_WO[-1, 2]
     assert depth == pytest.approx(WEIGHT / 4.0 / stiffness, rel=2e-3)
+
+
+def test_a_mesh_touches_with_the_corners_of_its_hull(tmp_path):
+    file = tmp_path / "cuboid.stl"
+    trimesh.creation.box(PANDA.object.shape.size).export(file)
+    mesh = homogeneous("box", MeshShape(str(file)), PANDA.object.mass)
+    _, block = resting(believed=replace(PANDA, object=mesh))
+    _, exact = resting()
+    np.testing.assert_allclose(
+        block.f_W[-1], exact.f_W[-1], atol=1e-3
+    )  # N; STL has single precision
+
+
+@pytest.mark.parametrize("name", ["cylinder-side", "cylinder-tilt"])
+def test_the_surface_carries_all_of_a_cylinders_weight(name):
+    lying = scenario(name)
+    plant = DrakePlant(lying)
+    start = plan_joints(lying).start
+    plant.reset(start)
+    robot = RobotModel(lying)
+    for _ in range(300):
+        robot.update(plant.measure().q)
+        plant.apply(robot.gravity())
+        plant.step()
+    p_WO = plant.measure().p_WO
+    # It neither falls nor rolls: its points sink in by less than the edge's stiffness allows.
+    assert np.abs(p_WO[:2] - lying.path.start.position[:2]).max() < 1e-5
+    sunk = lying.path.start.position[2] - p_WO[2]
+    assert 0.0 < sunk <= 1.01 * lying.object.mass * GRAVITY / 2.0 / EDGE.stiffness
 
 
 def test_mass_and_place_of_the_object_are_the_worlds():
