@@ -72,6 +72,12 @@ class Checks:
         found += self._end(tilt, trace)
         return tuple(sorted(found, key=lambda failure: failure.t))
 
+    def lost(self, i: int, history: ContactHistory, held: Mask) -> Mask:
+        """Return the steps at which a contact counts as lost while it should hold, (k,)."""
+        limits, hand = self._limits, i < len(self._scenario.hands)
+        lost_s = limits.lost_s if hand else _given(limits.support_lost_s, limits.lost_s)
+        return self._stretches(held & ~history.kept[:, i], lost_s)
+
     def _contact(
         self,
         i: int,
@@ -82,13 +88,12 @@ class Checks:
     ) -> list[Failure]:
         limits, failures = self._limits, []
         name, hand = self._scenario.contact_names[i], i < len(self._scenario.hands)
-        off = held_rows & ~history.kept[:, i]
-        lost_s = limits.lost_s if hand else _given(limits.support_lost_s, limits.lost_s)
-        lost = self._stretches(off, lost_s)
+        lost = self.lost(i, history, held_rows)
         # What a contact does once it has let go is no news.
         held = held_rows & ~np.logical_or.accumulate(lost)
         if lost.any():
-            count = f"{np.count_nonzero(off)} of {np.count_nonzero(held_rows)}"
+            off = np.count_nonzero(held_rows & ~history.kept[:, i])
+            count = f"{off} of {np.count_nonzero(held_rows)}"
             text = f"Contact {name} let go at {{when}}; it was lost in {count} steps."
             failures.append(_failure(trace, lost, Category.LOST, name, text))
         # Not "more than": what is no number is no success.

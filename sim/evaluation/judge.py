@@ -61,7 +61,7 @@ class Judge:
         free = self._schedule.free[phase]
         tilt = self._tilt(trace)
         contacts = {
-            name: _contact(i, trace, history, held, free, self._scenario.physics.timestep)
+            name: self._contact(i, trace, history, held, free)
             for i, name in enumerate(self._scenario.contact_names)
         }
         failures: tuple[Failure, ...]
@@ -94,6 +94,33 @@ class Judge:
             recording=info.recording,
         )
 
+    def _contact(
+        self, i: int, trace: Trace, history: ContactHistory, held: Mask, free: Mask
+    ) -> ContactReport:
+        impact = float(history.w_measured_C[free, i, N].max(initial=0.0))
+        if not held.any():
+            return ContactReport(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, impact, 0.0)
+        kept = history.kept[held, i]
+        holding = ~np.logical_or.accumulate(self._checks.lost(i, history, held))[held]
+        normal = history.w_measured_C[held, i, N]
+
+        def largest(quantity: Array) -> float:
+            return float(quantity[held, i][holding & kept].max(initial=0.0))
+
+        return ContactReport(
+            kept_fraction=float(kept.mean()),
+            slip_mm=1e3 * largest(history.slip),
+            slide_mm=1e3 * largest(history.slide),
+            spin_deg=float(np.degrees(largest(np.abs(history.spin)))),
+            max_utilisation=largest(history.utilisation),
+            max_normal_n=float(normal.max()),
+            force_error_rms_n=rms(normal - trace.w_commanded_C[held, i, N]),
+            free_normal_n=impact,
+            longest_gap_ms=1e3
+            * self._scenario.physics.timestep
+            * int(stretches(~kept).max(initial=0)),
+        )
+
     def _phases(self, trace: Trace) -> tuple[PhaseReport, ...]:
         names = [phase.name for phase in self._schedule.phases]
         begun = np.flatnonzero(np.diff(trace.phase, prepend=-1.0))
@@ -124,32 +151,6 @@ class Judge:
             joint=self._joints[worst],
             saturated_fraction=float(np.mean(np.any(trace.saturated, axis=1))),
         )
-
-
-def _contact(
-    i: int, trace: Trace, history: ContactHistory, held_rows: Mask, free: Mask, timestep: float
-) -> ContactReport:
-    impact = float(history.w_measured_C[free, i, N].max(initial=0.0))
-    if not held_rows.any():
-        return ContactReport(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, impact, 0.0)
-    kept = history.kept[held_rows, i]
-    held = np.logical_and.accumulate(kept)
-    normal = history.w_measured_C[held_rows, i, N]
-
-    def largest(quantity: Array) -> float:
-        return float(quantity[held_rows, i][held].max(initial=0.0))
-
-    return ContactReport(
-        kept_fraction=float(kept.mean()),
-        slip_mm=1e3 * largest(history.slip),
-        slide_mm=1e3 * largest(history.slide),
-        spin_deg=float(np.degrees(largest(np.abs(history.spin)))),
-        max_utilisation=largest(history.utilisation),
-        max_normal_n=float(normal.max()),
-        force_error_rms_n=rms(normal - trace.w_commanded_C[held_rows, i, N]),
-        free_normal_n=impact,
-        longest_gap_ms=1e3 * timestep * int(stretches(~kept).max(initial=0)),
-    )
 
 
 def _synthesis(trace: Trace) -> SynthesisReport:
