@@ -24,7 +24,7 @@ BOX = replace(SOFT_BOX, hands=tuple(replace(hand, material=STIFF) for hand in SO
 WEIGHT = BOX.object.mass * GRAVITY
 ROBOT = RobotModel(BOX)
 FRAMES = ContactFrames(BOX)
-HANDS = len(BOX.hands)
+HANDS, CONTACTS = len(BOX.hands), len(BOX.contact_names)
 # Joint impedance that keeps the arms where they are while they push [rad/s].
 BANDWIDTH = 30.0
 
@@ -53,7 +53,7 @@ def rotation_of(measurement):
     return Rotation.from_quat(measurement.quat_WO, scalar_first=True).as_matrix()
 
 
-def stepped(plant, steps, torques=None, contacts=len(BOX.contact_names)):
+def stepped(plant, steps, torques=None, contacts=CONTACTS):
     """The block of steps with torques(measurement), or with those that are applied already."""
     block = Trace.allocate(steps, len(plant.joints), HANDS, contacts)
     for row in range(steps):
