@@ -12,8 +12,6 @@ from fulcrum.scenarios import scenario
 from fulcrum.scenarios.cli import main
 from fulcrum.scenarios.commands.common import chosen_planning
 from fulcrum.sim.planning.execution import Planning, planned_tilt
-from fulcrum.sim.run.execute import Request, execute
-from fulcrum.sim.scenario.control import controllers
 from fulcrum.sim.scenario.phases import Phase
 from fulcrum.sim.sweep.design import Sweep
 from fulcrum.sim.sweep.episode import run_episode
@@ -22,10 +20,10 @@ from fulcrum.sim.world.world import World
 from fulcrum.synthesis import InvalidInputError
 from fulcrum.synthesis.arrays import N
 from fulcrum.synthesis.path.problem import PathObjective
-from tests.helpers.executions import broken, executed, executed_as, execution, longest, preparation
+from tests.helpers.executions import broken, executed, executed_as, execution, longest
 from tests.helpers.plans import BOX, CYLINDER, fastest
 from tests.helpers.recordings import Content
-from tests.helpers.runs import rows_of, settled
+from tests.helpers.runs import rows_of
 
 TICK = 0.001
 
