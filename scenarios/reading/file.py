@@ -11,7 +11,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any, TypeVar
 
-from pydantic import TypeAdapter, ValidationError
+from pydantic import ValidationError
 
 from fulcrum.scenarios.reading.access import Access
 from fulcrum.scenarios.reading.build import build
@@ -19,6 +19,7 @@ from fulcrum.scenarios.reading.places import vector
 from fulcrum.scenarios.reading.source import FileError, Source, explained, nearest
 from fulcrum.scenarios.schema.keys import FileTable
 from fulcrum.scenarios.schema.tables import LiftedFile, ScenarioFile
+from fulcrum.scenarios.schema.walk import json_schema
 from fulcrum.sim.scenario import HOLD, Pivot, Scenario, lifted, tilting
 from fulcrum.synthesis import InvalidInputError
 
@@ -81,7 +82,7 @@ def _validated(source: Source, model: type[Model]) -> Model:
     try:
         return model.model_validate(source.data)
     except ValidationError as error:
-        raise explained(source, model, error) from None
+        raise explained(source, model.__name__, error) from None
 
 
 def _lifted(source: Source, table: LiftedFile, allowed: tuple[Path, ...]) -> Scenario:
@@ -150,7 +151,7 @@ def bring_schema(folder: Path) -> None:
 
 def schema() -> dict[str, Any]:
     """The JSON Schema of scenario files."""
-    made = TypeAdapter(ScenarioFile | LiftedFile).json_schema()
+    made = json_schema()
     return {
         "$schema": "https://json-schema.org/draft/2020-12/schema",
         "title": _TITLE,

@@ -10,7 +10,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
-from pydantic import BaseModel, ValidationError
+from pydantic import ValidationError
 
 from fulcrum.scenarios.schema.keys import CORNER, NAME, PREFIX
 from fulcrum.scenarios.schema.walk import table_at
@@ -188,7 +188,7 @@ def nearest(word: str, known: list[str]) -> str:
     return f"one of {shown[0]}, {rest}" if rest else shown[0]
 
 
-def explained(source: Source, model: type[BaseModel], error: ValidationError) -> FileError:
+def explained(source: Source, kind: str, error: ValidationError) -> FileError:
     """The first of all errors that pydantic found, as a sentence; the others are counted."""
     found = []
     for details in error.errors(include_url=False):
@@ -199,7 +199,7 @@ def explained(source: Source, model: type[BaseModel], error: ValidationError) ->
     _, _, key, details = found[0]
     if details["type"] == "value_error":
         return source.refused(key, details["ctx"]["error"])
-    given, valid = _sentence(model, details, key)
+    given, valid = _sentence(kind, details, key)
     if len(found) > 1:
         valid += f" (and {len(found) - 1} more to mend)"
     return source.error(key, given, valid)
@@ -220,13 +220,15 @@ def _key(data: Any, loc: tuple[str | int, ...]) -> KeyPath:
     return tuple(key)
 
 
-def _sentence(model: type[BaseModel], details: Any, key: KeyPath) -> tuple[object, str]:
-    """What was given, and what is valid."""
+def _sentence(file: str, details: Any, key: KeyPath) -> tuple[object, str]:
+    """Return what was given, and what is valid."""
     kind, given, context = details["type"], details["input"], details.get("ctx", {})
     if kind == "extra_forbidden":
-        return "a key that does not exist", nearest(str(key[-1]), keys_at(model, details["loc"]))
+        return "a key that does not exist", nearest(
+            str(key[-1]), list(table_at(file, details["loc"])["properties"])
+        )
     if kind == "missing":
-        return "nothing", _described(model, details["loc"])
+        return "nothing", _described(file, details["loc"])
     if kind == "string_type" and {"edge", "corner"} & set(details["loc"]):
         points = "point_m and axis" if "edge" in details["loc"] else "point_m"
         return _shown(given), f"{_FORMS[CORNER]}; points go into {points}, as those of meshes must"
@@ -259,14 +261,9 @@ def _shown(given: object) -> str:
     return text if len(text) <= 60 else f"{text[:57]}.."
 
 
-def keys_at(model: type[BaseModel], loc: tuple[str | int, ...]) -> list[str]:
-    """The keys that the table may have in which a location ends."""
-    return list(table_at(model, loc).model_fields)
-
-
-def _described(model: type[BaseModel], loc: tuple[str | int, ...]) -> str:
-    field = table_at(model, loc).model_fields[str(loc[-1])]
-    text = (field.description or "a value").rstrip(".").replace("\n", " ")
+def _described(file: str, loc: tuple[str | int, ...]) -> str:
+    key = table_at(file, loc)["properties"][loc[-1]]
+    text = key.get("description", "a value").rstrip(".").replace("\n", " ")
     return f"a value for this key ({_lower(text)})"
 
 
