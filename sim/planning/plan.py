@@ -41,7 +41,9 @@ class PlanError(FulcrumError):
         named = [
             name if math.isnan(tilt) else f"{name} at {tilt:.1f} deg" for name, tilt in binding
         ]
-        super().__init__(f"{scenario}: {what} breaks a limit; most binding: {', '.join(named)}.")
+        super().__init__(
+            f"{scenario}: {what} breaks a limit; these limit it most: {', '.join(named)}."
+        )
 
 
 class Moment(NamedTuple):
@@ -224,13 +226,12 @@ class Plan:
         return merged
 
     def page(self) -> Page:
-        """Return duration, proof, stretches of the tilt and the limits used most as a page."""
+        """Return duration, errors, the limits reached over the tilt, and the limits used most."""
         found, residuals = self.solution, self.solution.residuals
         places = np.degrees(self.tilt[found.problem.stations[:, 0]])
         used = sorted(found.shares.items(), key=lambda item: -item[1].max())
-        grip = (
-            f"One grip for {len(found.problem.loads)} worlds: {100 * self.share:.0f} % of the set"
-        )
+        worlds, share = len(found.problem.loads), f"{100 * self.share:.0f} %"
+        grip = f"One grip holds in {worlds} worlds: in {share} of the uncertainty set"
         return page(
             (
                 Marked(f"{self.scenario.name}, {found.problem.objective}"),
@@ -240,10 +241,10 @@ class Plan:
                 f"{math.degrees(self.peak_rate):.1f} deg/s; solved in {1e3 * found.solve_s:.0f} ms",
             ),
             f"{grip} of controller robust." if len(found.problem.loads) > 1 else "",
-            f"Limits and balance kept to {max(residuals.primal, 0.0):.1e}, optimal to "
+            f"Relative errors: limits and balance {max(residuals.primal, 0.0):.1e}, optimality "
             f"{max(residuals.dual, residuals.gap):.1e}.",
             table(
-                ("tilt [deg]", "limits used up"),
+                ("tilt [deg]", "limits reached"),
                 [
                     (f"{low:.1f} to {high:.1f}", ", ".join(limits) or "none")
                     for low, high, limits in self.stretches()

@@ -17,7 +17,7 @@ from fulcrum.sim.sweep.episode import check_holdable, run_episode
 from fulcrum.sim.sweep.store import Store
 from fulcrum.sim.sweep.summary import Score, scores
 from fulcrum.synthesis import FulcrumError, InvalidInputError
-from fulcrum.synthesis.render import Lines, Marked, Page, page, table, to_markdown
+from fulcrum.synthesis.render import Lines, Page, page, table, to_markdown
 
 # How many causes of failures are named.
 _NAMED = 6
@@ -64,12 +64,12 @@ class SweepResult:
             for score in self.scores
         ]
         head = ("controller", "episodes", "success (95 %) [%]", "grip [N]")
-        more = ("friction used [%]", "force error [N]", "failures began with")
+        more = ("friction used [%]", "force error [N]", "first causes of failure")
         replays = [(s.controller, s.causes[0]) for s in self.scores if s.causes]
         return page(
-            Marked("Sweep"),
+            "Success rates with their 95 % intervals; medians over the episodes of each controller:",
             table((*head, *more), rows),
-            Lines(tuple(f"{name}, {first.cause}: {first.replay}" for name, first in replays)),
+            Lines(tuple(f"Replay of {name}, {first.cause}: {first.replay}" for name, first in replays)),
         )
 
     def _repr_markdown_(self) -> str:
