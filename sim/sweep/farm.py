@@ -67,9 +67,11 @@ class SweepResult:
         more = ("friction used [%]", "force error [N]", "first causes of failure")
         replays = [(s.controller, s.causes[0]) for s in self.scores if s.causes]
         return page(
-            "Success rates with their 95 % intervals; medians over the episodes of each controller:",
+            "Success rates with their 95 % intervals, and medians over the episodes:",
             table((*head, *more), rows),
-            Lines(tuple(f"Replay of {name}, {first.cause}: {first.replay}" for name, first in replays)),
+            Lines(
+                tuple(f"Replay of {name}, {first.cause}: {first.replay}" for name, first in replays)
+            ),
         )
 
     def _repr_markdown_(self) -> str:
