@@ -1,6 +1,7 @@
 """What functions and commands are asked for, checked: scenario, control, plan, world, run, sweep.
 
-Errors call arguments by their names, which the command line writes as options.
+What is not valid raises InvalidInputError with the name of the argument; the command line writes
+it as an option.
 """
 
 from __future__ import annotations
@@ -43,11 +44,7 @@ def as_scenario(asked: Asked) -> Scenario:
 
 
 def chosen_control(scene: Scenario, controller: str, objective: str | None = None) -> Control:
-    """Return the settings of a controller, with another objective if one is given.
-
-    Raises:
-        InvalidInputError: There is no such controller or objective.
-    """
+    """Return the settings of a controller, with another objective if one is given."""
     control = named_controller(scene.control, controller)
     if objective is None:
         return control
@@ -57,11 +54,7 @@ def chosen_control(scene: Scenario, controller: str, objective: str | None = Non
 def chosen_planning(
     scene: Scenario, plan: str | None, stretch: float, duration: float | None, robust: bool
 ) -> Planning | None:
-    """Return how the tilt is planned; None if it is not.
-
-    Raises:
-        InvalidInputError: There is no such plan, or none to be stretched or made robust.
-    """
+    """Return how the tilt is planned; None if it is not."""
     if plan is not None:
         return asked_planning(scene, "plan", plan, stretch, duration, robust)
     for option, given, default in (("stretch", stretch, 1.0), ("robust", robust, False)):
@@ -79,11 +72,7 @@ def asked_planning(
     robust: bool,
     points: int = Planning.points,
 ) -> Planning:
-    """Return a plan as asked for, with the scene's own duration if the objective needs one.
-
-    Raises:
-        InvalidInputError: There is no such objective; names the field in which it was given.
-    """
+    """Return a plan as asked for, with the scene's own duration if the objective needs one."""
     kind = one_of(PathObjective, field, objective)
     if duration is None:
         own = sum(scene.phases[i].duration_s for i in tilting(scene.phases))
@@ -92,22 +81,14 @@ def asked_planning(
 
 
 def chosen_engine(name: str) -> Engine:
-    """Return the engine of a name.
-
-    Raises:
-        InvalidInputError: There is none of that name, or it is not installed.
-    """
+    """Return the engine of a name, which must be installed."""
     engine = one_of(Engine, "engine", name)
     check_installed(engine)
     return engine
 
 
 def one_of(kind: type[Choice], field: str, text: str) -> Choice:
-    """Return the member of an enumeration that a text names.
-
-    Raises:
-        InvalidInputError: There is none of that name.
-    """
+    """Return the member of an enumeration that a text names."""
     if text not in list(kind):
         raise InvalidInputError(field, text, f"one of {', '.join(kind)}")
     return kind(text)
@@ -123,23 +104,10 @@ def prepared_request(
     best_effort: bool,
     disturbed: bool,
 ) -> tuple[Request, Preparation]:
-    """Return a run as a request, and what is prepared of it; nothing is written.
+    """Return what :func:`fulcrum.run` executes, and what is prepared of it; nothing is written.
 
-    Args:
-        scene: The scene.
-        controller: Name; the one that suits if left out.
-        objective: What the synthesis minimises; the scene's own if left out.
-        planning: How the tilt is planned; None for the scene's own timing.
-        duration: Duration of a tilt that is not planned [s]; the scene's own if left out.
-        worlds: Preset and seed of the world, and the parameters to set of it.
-        best_effort: Whether to run where no forces balance the object, with the nearest.
-        disturbed: Whether the tolerances for disturbed runs count in a nominal world, too.
-
-    Raises:
-        InvalidInputError: An argument is not valid.
-        PathError: The arms cannot follow the path.
-        UnholdableError: No forces hold the object somewhere on the path.
-        PlanError: The planned tilt breaks a limit.
+    Args and errors are those of that function, but for ``worlds``: preset and seed of the world,
+    and the parameters to set of it.
     """
     preset, seed, values = worlds
     whole("seed", seed, least=0)
@@ -164,11 +132,7 @@ def prepared_request(
 
 
 def drawn_world(scene: Scenario, preset: str, seed: int, values: Mapping[str, float]) -> World:
-    """Return the world of a preset and seed, with some parameters set, as in a sweep's episode.
-
-    Raises:
-        InvalidInputError: There is no such preset or parameter.
-    """
+    """Return the world of a preset and seed, with some parameters set, as in a sweep's episode."""
     named = {parameter_name("world", key): value for key, value in values.items()}
     return overridden(presets.draw(presets.preset(preset), scene, seed), scene, named)
 
@@ -183,12 +147,7 @@ def sweep_design(
     planning: Planning | None,
     called: str,
 ) -> Sweep:
-    """Return a sweep whose replays call the scene as said; by default of all that can be compared.
-
-    Raises:
-        InvalidInputError: An argument is not valid.
-        PlanError: The planned tilt breaks a limit.
-    """
+    """Return what :func:`fulcrum.sweep` runs; replays name the scene as it is ``called``."""
     from fulcrum.sim.sweep import Sweep  # takes long to import
 
     if planning is not None:

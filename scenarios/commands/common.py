@@ -6,6 +6,7 @@ import contextlib
 import dataclasses
 import itertools
 import re
+import shlex
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from datetime import datetime
@@ -80,6 +81,19 @@ class Chosen:
         """How a command line names the scenario."""
         allowed = [("--allow-path", str(folder)) for folder in self.allow_path]
         return [self.scenario, *itertools.chain.from_iterable(allowed)]
+
+    def line(self, command: str, without: tuple[str, ...] = (), **instead: object) -> str:
+        """Return the command line of a command, without some options, or with other values."""
+        words = ["fulcrum", command, *self.words]
+        for option in dataclasses.fields(self):
+            given = instead.get(option.name, getattr(self, option.name))
+            for value in given if isinstance(given, tuple) else (given,):
+                # No comparison with False: 0 is a seed.
+                left_out = option.name in ("scenario", "allow_path", *without)
+                if not left_out and value not in (None, "") and value is not False:
+                    name = f"--{option.name.replace('_', '-')}"
+                    words += [name] if value is True else [name, str(value)]
+        return shlex.join(words)
 
 
 @dataclass(frozen=True)

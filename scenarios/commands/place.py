@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import shlex
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal
@@ -23,6 +22,8 @@ if TYPE_CHECKING:
 Kept = Literal["base", "hands", "turn", "posture"]
 # Share of the time for the search; start, file and picture take the rest [-].
 _SEARCHED = 0.9
+# Options that do not change the placement.
+_NOT_NOTED = "out", "overwrite", "seconds", "workers"
 
 
 @dataclass(frozen=True)
@@ -92,7 +93,7 @@ class PlaceCommand(common.Chosen):
         if not found.improved:
             return common.FAILED
         elsewhere = out.absolute().parent != source.file.absolute().parent
-        note = f"Placed by `fulcrum place {shlex.join(self._words())}`."
+        note = f"Placed by `{self.line('place', _NOT_NOTED)}`."
         text = placed(source.file.read_text("utf-8-sig"), scenario, found.scenario, note, elsewhere)
         made(Source(out, text), self.allow_path)  # a file that it names may be out of its reach now
         if elsewhere:
@@ -102,13 +103,6 @@ class PlaceCommand(common.Chosen):
         draw(scenario, found, chosen_control(scenario, self.controller), picture)
         show(page(f"Scenario: {out}; picture: {picture}"))
         return common.PASSED
-
-    def _words(self) -> list[str]:
-        """Return the command line, without where it writes and how many processes it takes."""
-        words = [*self.words, "--goal", self.goal, "--controller", self.controller]
-        words += [word for kept in self.keep for word in ("--keep", kept)]
-        words += ["--reach", f"{self.reach:g}", "--height", f"{self.height:g}"]
-        return [*words, "--evaluations", f"{self.evaluations}", "--seed", f"{self.seed}"]
 
     def _source(self) -> Source:
         """Return the scenario's file; refuse one that lifts another scenario."""

@@ -7,7 +7,6 @@ import shlex
 import sys
 import time
 from dataclasses import dataclass
-from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import tyro
@@ -87,7 +86,7 @@ class SweepCommand(common.Planned):
             left = len(store.missing())
             print(
                 f"fulcrum: interrupted; {len(sweep.all_episodes()) - left} episodes are kept, "
-                f"{left} are left. Resume with: {self._again(store.folder)}",
+                f"{left} are left. Resume with: {self.line('sweep', out=store.folder)}",
                 file=sys.stderr,
             )
             return common.INTERRUPTED
@@ -148,14 +147,3 @@ class SweepCommand(common.Planned):
         if len(set(names)) != 2 or len(names) != 2:
             raise InvalidInputError("--map", self.map, "two parameters, like mass,friction")
         return names[0], names[1]
-
-    def _again(self, folder: Path) -> str:
-        """Return the command that resumes this sweep."""
-        words = ["fulcrum", "sweep", *self.words]
-        for field in dataclasses.fields(self):
-            value = folder if field.name == "out" else getattr(self, field.name)
-            # No False: 0 is one to Python, and a seed.
-            if field.name in ("scenario", "allow_path") or value in (None, "") or value is False:
-                continue
-            words += [f"--{field.name}"] if value is True else [f"--{field.name}", str(value)]
-        return shlex.join(words)

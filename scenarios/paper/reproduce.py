@@ -50,16 +50,14 @@ class Reproduction:
     grip_errors: dict[str, list[float]]
 
     def page(self) -> Page:
-        """Return every statement with both numbers and the reason, and the grip errors, as a page."""
+        """Return every statement with both numbers and the reason, and the grip errors."""
         lines: list[Line] = []
         for s in self.statements:
             numbers = (f": {s.statement}: ", Marked(s.paper), "; ours: ", Marked(s.ours))
             lines += [(_MARKS[s.reproduced], *numbers), f"    {s.reason}"]
         for name, errors in self.grip_errors.items():
             percent = " and ".join(f"{100 * error:.2f} %" for error in errors)
-            lines.append(
-                f"closed loop, {name}: RMS error of the measured grip {percent} of the computed peak"
-            )
+            lines.append(f"closed loop, {name}: RMS error of the grip {percent} of its peak")
         return page(Lines(tuple(lines)))
 
 

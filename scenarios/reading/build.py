@@ -10,13 +10,7 @@ import numpy as np
 from fulcrum.assets import ROBOTS
 from fulcrum.scenarios.reading.access import Access
 from fulcrum.scenarios.reading.contacts import make_hand, make_support
-from fulcrum.scenarios.reading.object import (
-    Thing,
-    make_object,
-    make_surface,
-    make_thing,
-    material,
-)
+from fulcrum.scenarios.reading.object import Thing, make_object, make_surface, make_thing, material
 from fulcrum.scenarios.reading.places import direction, only_one, orientation, vector
 from fulcrum.scenarios.reading.source import KeyPath, Source
 from fulcrum.scenarios.schema.motion import (

@@ -50,7 +50,7 @@ class SweepResult:
     scores: tuple[Score, ...]
 
     def page(self) -> Page:
-        """Return each controller's success rate, and what its failures began with, as a page."""
+        """Return each controller's success rate, first causes of failure, and replays as a page."""
         rows = [
             (
                 score.controller,

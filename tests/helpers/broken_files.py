@@ -81,7 +81,7 @@ BROKEN = {
         LEFT_AT,
         f"{LEFT_AT}\ntangent = [0, 1, 0]",
         "hands.left.tangent",
-        "perpendicular to the normal",
+        "perpendicular to the",
     ),
     "contact off the surface": Broken(
         LEFT_AT, "point_m = [0, 0.15, 0]", "hands.left.point_m", "the nearest being [0, 0.1, 0]"
