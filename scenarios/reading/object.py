@@ -122,7 +122,7 @@ def front(surface: SurfaceTable) -> Vector:
 def material(
     source: Source, key: KeyPath, table: ContactTable | None, usual: ContactMaterial
 ) -> ContactMaterial:
-    """Stiffness and damping of a contact; as usual where they are not given."""
+    """Return stiffness and damping of a contact; the usual ones where they are not given."""
     if table is None:
         return usual
     ball = {n: getattr(table, n) for n in ("youngs_modulus_pa", "radius_m", "load_n")}

@@ -39,11 +39,11 @@ class LostEpisodesError(FulcrumError):
 
 @dataclass(frozen=True, eq=False)
 class SweepResult:
-    """What a sweep gave.
+    """Results of a sweep.
 
     Attributes:
         rows: All episodes, one row each.
-        scores: What they come to, by controller.
+        scores: Success rate and causes of failure of each controller.
     """
 
     rows: pa.Table
@@ -79,7 +79,7 @@ class SweepResult:
 
 
 def _named(score: Score) -> str:
-    """The most frequent causes of a controller's failures."""
+    """Return the most frequent causes of a controller's failures."""
     named = ", ".join(f"{c.cause} ({c.episodes})" for c in score.causes[:_NAMED])
     more = len(score.causes) - _NAMED
     return (named or "none") + (f" and {more} more" if more > 0 else "")
@@ -88,15 +88,15 @@ def _named(score: Score) -> str:
 def run_sweep(
     sweep: Sweep, out: Path, workers: Workers = LOCAL, progress: SweepProgress | None = None
 ) -> SweepResult:
-    """Runs the episodes that are missing in a folder.
+    """Run the episodes that are missing in a folder.
 
     Dask gives the episodes of a worker that dies to another one. What has been written survives
     whatever happens to this process: another call with the same folder goes on from there.
 
     Args:
-        sweep: Who meets which worlds.
+        sweep: Controllers and worlds.
         out: New or empty folder, or one of the same sweep.
-        workers: Who runs the episodes.
+        workers: Processes or cluster that run the episodes.
         progress: Called after each.
 
     Raises:
