@@ -21,6 +21,7 @@ from fulcrum.scenarios.commands.common import (
     PASSED,
     Chosen,
 )
+from fulcrum.scenarios.commands.crosscheck import CrosscheckCommand
 from fulcrum.scenarios.commands.explain import CapacityCommand, ExplainCommand
 from fulcrum.scenarios.commands.list import ListCommand
 from fulcrum.scenarios.commands.new import NewCommand
@@ -46,6 +47,7 @@ AnyCommand = (
     | Annotated[PlaceCommand, tyro.conf.subcommand("place")]
     | Annotated[PlanCommand, tyro.conf.subcommand("plan")]
     | Annotated[ReproduceCommand, tyro.conf.subcommand("reproduce")]
+    | Annotated[CrosscheckCommand, tyro.conf.subcommand("crosscheck")]
     | Annotated[SweepCommand, tyro.conf.subcommand("sweep")]
 )
 

@@ -22,7 +22,7 @@ ALLOWED = {
     "synthesis": {"assets"},
     "assets": set(),
 }
-SIMULATORS = {"mujoco", "dm_control", "dm_env", "mink", "pinocchio", "rerun"}
+SIMULATORS = {"mujoco", "dm_control", "dm_env", "mink", "pinocchio", "pydrake", "rerun"}
 STEPS = {"mj_step", "mj_step1", "mj_step2"}
 MAX_LINES = 350
 # Names for a cuboid, of MuJoCo, Rerun and ours; `synthesis` and `sim` may not say the words else.
@@ -135,6 +135,12 @@ def test_only_the_recording_imports_rerun():
     importers = {name(p) for p in FILES if "rerun" in packages_imported(p.read_text())}
     assert importers
     assert all(path.startswith("sim/recording/") for path in importers)
+
+
+def test_only_the_plants_own_modules_import_drake():
+    importers = {name(p) for p in FILES if "pydrake" in packages_imported(p.read_text())}
+    assert importers
+    assert all(path.startswith("sim/plant/drake") for path in importers)
 
 
 def test_synthesis_imports_no_simulator_and_no_recorder():

@@ -16,6 +16,7 @@ import tyro
 
 if TYPE_CHECKING:
     from fulcrum.sim.planning import Planning
+    from fulcrum.sim.plant import Engine
     from fulcrum.sim.scenario import Control, Scenario
 
 Choice = TypeVar("Choice", bound=StrEnum)
@@ -95,6 +96,19 @@ def one_of(kind: type[Choice], option: str, text: str) -> Choice:
     if text not in list(kind):
         raise InvalidInputError(option, text, f"one of {', '.join(kind)}")
     return kind(text)
+
+
+def chosen_engine(name: str) -> Engine:
+    """Return the engine that ``--engine`` names.
+
+    Raises:
+        InvalidInputError: It names none, or one that is not installed.
+    """
+    from fulcrum.sim.plant import Engine, check_installed
+
+    engine = one_of(Engine, "--engine", name)
+    check_installed(engine)
+    return engine
 
 
 def chosen_planning(

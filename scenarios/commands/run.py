@@ -13,6 +13,7 @@ from fulcrum.scenarios.commands.common import (
     Chosen,
     check_results_folder,
     chosen_control,
+    chosen_engine,
     chosen_planning,
     progress_bar,
     results_folder,
@@ -60,6 +61,8 @@ class RunCommand(Chosen):
     disturbed: bool = False
     """Judge by the scenario's tolerances for disturbed runs, as sweeps do, and as it is done with
     --world and every preset but nominal."""
+    engine: str = "mujoco"
+    """What simulates the plant: mujoco or drake (which needs the extra `drake`)."""
 
     out: Path | None = None
     """New or empty folder for the results; logs/SCENARIO-CONTROLLER-TIME if left out."""
@@ -129,5 +132,6 @@ class RunCommand(Chosen):
         out = results_folder(self.out, f"{chosen.name}-{controller}")
         how = self.seed, out, self.live, self.best_effort
         disturbed = self.disturbed or self.preset != "nominal" or bool(self.world)
-        request = Request(chosen, controller, control, *how, world, planning, disturbed)
+        engine = chosen_engine(self.engine)
+        request = Request(chosen, controller, control, *how, world, planning, disturbed, engine)
         return request, prepared

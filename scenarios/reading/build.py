@@ -10,7 +10,13 @@ import numpy as np
 from fulcrum.assets import ROBOTS
 from fulcrum.scenarios.reading.access import Access
 from fulcrum.scenarios.reading.contacts import make_hand, make_support
-from fulcrum.scenarios.reading.object import Thing, make_object, make_surface, make_thing
+from fulcrum.scenarios.reading.object import (
+    Thing,
+    make_object,
+    make_surface,
+    make_thing,
+    material,
+)
 from fulcrum.scenarios.reading.places import direction, only_one, orientation, vector
 from fulcrum.scenarios.reading.source import KeyPath, Source
 from fulcrum.scenarios.schema.motion import (
@@ -26,6 +32,7 @@ from fulcrum.sim.scenario import (
     HOLD,
     LEAVE,
     REACH,
+    SUPPORT,
     TILT,
     Phase,
     Pivot,
@@ -91,7 +98,12 @@ def _rests(thing: Thing, file: ScenarioFile, supports: tuple[Support, ...]) -> t
     """Surfaces with friction on which no support stands."""
     taken = {support.surface for support in supports}
     return tuple(
-        Rest(thing.resting, name, surface.friction)
+        Rest(
+            thing.resting,
+            name,
+            surface.friction,
+            material(thing.source, ("environment", name, "contact"), surface.contact, SUPPORT),
+        )
         for name, surface in file.environment.items()
         if surface.friction is not None and name not in taken
     )

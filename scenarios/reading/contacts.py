@@ -9,7 +9,7 @@ import numpy as np
 
 from fulcrum.assets import HANDS
 from fulcrum.scenarios.reading.access import Access
-from fulcrum.scenarios.reading.object import Thing, front
+from fulcrum.scenarios.reading.object import Thing, front, material
 from fulcrum.scenarios.reading.places import (
     ON_SURFACE,
     direction,
@@ -23,7 +23,7 @@ from fulcrum.scenarios.reading.source import KeyPath, Source, nearest
 from fulcrum.scenarios.schema.tables import HandTable, SupportTable, SurfaceTable
 from fulcrum.sim.geometry import Geom, Pose
 from fulcrum.sim.model import across
-from fulcrum.sim.scenario import Hand, Support
+from fulcrum.sim.scenario import PAD, SUPPORT, Hand, Support
 from fulcrum.synthesis.arrays import Array, Vector
 
 # How far from perpendicular a tangent may be typed in [-]: access are given to a micrometre, on
@@ -52,6 +52,7 @@ def make_hand(thing: Thing, name: str, table: HandTable, access: Access) -> Hand
             friction=table.friction,
             f_n_max=math.inf if table.grip_limit_n is None else table.grip_limit_n,
             mount_pose=Pose(vector(table.mount_position_m or [0.0] * 3), turn(table.mount_rpy_deg)),
+            material=material(thing.source, (*key, "contact"), table.contact, PAD),
         )
 
 
@@ -94,9 +95,10 @@ def make_support(
     if surface is None:
         known = nearest(table.surface, list(surfaces))
         raise source.error((*key, "surface"), f'"{table.surface}"', known)
+    where: KeyPath = ("environment", table.surface)
     if surface.friction is None:
-        where: KeyPath = ("environment", table.surface, "friction")
-        raise source.error(where, "nothing", f"friction, such as {{ mu = 0.3 }}, for {name}")
+        valid = f"friction, such as {{ mu = 0.3 }}, for {name}"
+        raise source.error((*where, "friction"), "nothing", valid)
     point = _support_point(thing, key, table)
     p_W = thing.start.in_parent(point)
     closest, outward = surface_normal(geoms[table.surface], front(surface), p_W)
@@ -112,6 +114,7 @@ def make_support(
         normal_W=normal,
         tangent_W=_tangent(source, key, table.tangent, normal),
         friction=surface.friction,
+        material=material(source, (*where, "contact"), surface.contact, SUPPORT),
     )
 
 

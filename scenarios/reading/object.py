@@ -10,9 +10,10 @@ from fulcrum.scenarios.reading.access import Access
 from fulcrum.scenarios.reading.places import corner, only_one, orientation, vector
 from fulcrum.scenarios.reading.source import KeyPath, Source
 from fulcrum.scenarios.schema.derive import instance
-from fulcrum.scenarios.schema.tables import SHAPES, AnyObject, SurfaceTable
+from fulcrum.scenarios.schema.tables import SHAPES, AnyObject, ContactTable, SurfaceTable
 from fulcrum.sim.geometry import GRAVITY, Geom, Object, Pose, Shape, homogeneous
 from fulcrum.sim.geometry.shapes import Box, MeshShape
+from fulcrum.sim.scenario import ContactMaterial
 from fulcrum.synthesis.arrays import Vector
 
 # Spacing of the lines with which MuJoCo draws a plane [m].
@@ -132,6 +133,35 @@ def front(surface: SurfaceTable) -> Vector:
     facing = surface.facing or "-x"
     x, y, z = (float(facing == f"+{axis}") - float(facing == f"-{axis}") for axis in "xyz")
     return (x, y, z)
+
+
+def material(
+    source: Source, key: KeyPath, table: ContactTable | None, usual: ContactMaterial
+) -> ContactMaterial:
+    """Stiffness and damping of a contact; as usual where they are not given.
+
+    Raises:
+        FileError: The stiffness is given in two ways, or a ball in part.
+    """
+    if table is None:
+        return usual
+    ball = {n: getattr(table, n) for n in ("youngs_modulus_pa", "radius_m", "load_n")}
+    given = [name for name, value in ball.items() if value is not None]
+    damping_s = usual.damping_s if table.damping_s is None else table.damping_s
+    if not given:
+        stiffness = table.stiffness_n_per_m or usual.stiffness
+        return ContactMaterial(stiffness, damping_s)
+    if table.stiffness_n_per_m is not None:
+        valid = f"left out where there is {given[0]}"
+        raise source.error((*key, "stiffness_n_per_m"), table.stiffness_n_per_m, valid)
+    for name, value in ball.items():
+        if value is None:
+            raise source.error((*key, given[0]), ball[given[0]], f"together with {name}")
+    assert table.youngs_modulus_pa and table.radius_m and table.load_n
+    with source.at(key):
+        return ContactMaterial.hertz(
+            table.youngs_modulus_pa, table.radius_m, table.load_n, damping_s, table.poisson_ratio
+        )
 
 
 def colour(values: list[float]) -> tuple[float, float, float, float]:

@@ -33,6 +33,28 @@ from fulcrum.sim.scenario import Control, Friction, Physics, Scenario, Tolerance
 from fulcrum.synthesis.settings import Positive, Text
 
 
+class ContactTable(FileTable):
+    """How a contact gives way: its stiffness, or that of a ball on a flat by Hertz at a load."""
+
+    stiffness_n_per_m: Positive | None = None
+    """Normal force per depth [N/m]."""
+
+    youngs_modulus_pa: Positive | None = None
+    """Young's modulus of a ball on something much harder [Pa], instead of a stiffness."""
+
+    radius_m: Positive | None = None
+    """Radius of the ball [m]."""
+
+    load_n: Positive | None = None
+    """Normal force at which its stiffness is taken [N]."""
+
+    poisson_ratio: Annotated[float, Field(strict=True, ge=0.0, le=0.5)] = 0.5
+    """Poisson's ratio of the ball [-]; rubber has 0.5."""
+
+    damping_s: Positive | None = None
+    """Damping over stiffness [s]: the time in which a contact opens that is let go."""
+
+
 class ObjectTable(Placed):
     """The thing that is tilted. It needs exactly one of weight_n, mass_kg, density_kg_per_m3."""
 
@@ -100,10 +122,13 @@ class SurfaceTable(Placed):
     """Where the front of a wall looks; -x if it is left out."""
 
     friction: FromTable[Friction] | None = None
-    """Between it and the object. Without, the object passes through it."""
+    """Between it and the object. Without, the object must not touch it, if it is solid."""
+
+    contact: ContactTable | None = None
+    """How it and the object give way to each other; 4e5 N/m and 5 ms, if it is left out."""
 
     solid: bool = Geom.solid
-    """Whether the robots must keep clear of it."""
+    """Whether the robots must keep clear of it, and the object too, if it has no friction."""
 
     rgba: Colour = [0.75, 0.77, 0.80, 1.0]
     """Colour and opacity."""
@@ -146,6 +171,10 @@ class HandTable(FileTable):
 
     friction: FromTable[Friction]
     """Between tip and object."""
+
+    contact: ContactTable | None = None
+    """How tip and object give way to each other; as a rubber ball of 30 mm and 2 MPa under 50 N, if
+    it is left out: 4e4 N/m and 2 ms."""
 
     grip_limit_n: Positive | None = None
     """Largest normal force [N]; none, if it is left out."""

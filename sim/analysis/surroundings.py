@@ -11,7 +11,7 @@ from scipy.optimize import linprog
 from scipy.spatial.transform import Rotation
 
 from fulcrum.sim.geometry import Geom, read_mesh
-from fulcrum.sim.model import ObjectMotion, ObjectPath, compose, distance
+from fulcrum.sim.model import ObjectMotion, ObjectPath, compose, distance, object_pairs
 from fulcrum.sim.model.object_path import object_path
 from fulcrum.sim.scenario import Scenario
 from fulcrum.synthesis.arrays import Array
@@ -134,16 +134,7 @@ def _room(scenario: Scenario, path: ObjectPath, tilts: Array) -> Misfit | None:
 
 def _meeting(scenario: Scenario) -> list[tuple[str, str]]:
     """Geoms of the object, and what is in their way: where it rests, those that touch alone."""
-    resting = _resting(scenario)
-    surfaces = {surface for _, surface in resting}
-    solid = [
-        (own.name, other.name)
-        for other in scenario.environment
-        if other.solid and other.name not in surfaces
-        for own in scenario.object.geoms
-        if own.solid
-    ]
-    return [*resting, *solid]
+    return [*_resting(scenario), *object_pairs(scenario)]
 
 
 def _resting(scenario: Scenario) -> list[tuple[str, str]]:

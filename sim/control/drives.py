@@ -11,14 +11,8 @@ counts with inertia. The mass matrix M gives every joint, light or heavy, the sa
 is dead has no impedance. Whatever comes in, what goes out is finite and within the limits.
 
 A stiff impedance would also oppose the squeeze, by which the hands sink into what they hold. So
-that the force there is the one asked for, it leaves the squeeze to the feed-forward: with J_n the
-Jacobian of the hands' normal directions and e the unit vector along their commanded normal forces,
-M above becomes
-
-.. math:: M - J_n^T e\, e^T \Lambda J_n, \qquad \Lambda = (J_n M^{-1} J_n^T)^{-1}
-
-which takes away the normal forces along e that :math:`M \ddot q` means to hands that cannot move
-along their normals (Khatib 1987, the operational space formulation).
+that the force there is the one asked for, it leaves the squeeze to the feed-forward
+(:mod:`sim.control.squeeze`).
 """
 
 from __future__ import annotations
@@ -29,6 +23,7 @@ from bisect import bisect_right
 import numpy as np
 
 from fulcrum.sim.control.reaction import GripReaction
+from fulcrum.sim.control.squeeze import free_squeeze
 from fulcrum.sim.model import RobotModel, RobotState
 from fulcrum.sim.scenario import Control, Scenario
 from fulcrum.sim.signals import Measurement, Setpoint, Target
@@ -82,26 +77,16 @@ class Drives:
         self._extra = self._reaction.update(
             mass_matrix, self._setpoint, pull, self.tau_g, share, dt
         )
-        if self._control.yielding_squeeze:
-            mass_matrix = self._without_squeeze(mass_matrix)
         stiffness, damping = self._reaction.braced(mass_matrix, omega)
+        # After bracing, which would scale what is left of the squeeze.
+        if self._control.yielding_squeeze and share != 0.0:
+            stiffness, damping = free_squeeze(mass_matrix, self._setpoint, stiffness, damping)
         joints = len(stiffness)
         self._gains[:, :joints], self._gains[:, joints:] = stiffness, damping
         self.tau_g = robot.tau_g
         if target is not None and target.qdd is not None:
             self.tau_g = self.tau_g + robot.motion_torques(target.qd, target.qdd)
         self._share = math.nan  # what was held is to be found anew
-
-    def _without_squeeze(self, mass_matrix: Array) -> Array:
-        """The mass matrix less its part along the squeeze that is asked for."""
-        J_n = self._setpoint.J_C[:, N]
-        f_n = self._setpoint.w_commanded_C[: len(J_n), N]
-        squeeze = float(np.linalg.norm(f_n))
-        if self._share == 0.0 or squeeze == 0.0:
-            return mass_matrix
-        e = f_n / squeeze
-        inertia = np.linalg.inv(J_n @ np.linalg.solve(mass_matrix, J_n.T))
-        return mass_matrix - np.outer(e @ J_n, e @ inertia @ J_n)
 
     def follow(self, setpoint: Setpoint) -> None:
         """Takes over a setpoint that has arrived."""

@@ -113,7 +113,8 @@ class Checks:
             )
             failures.append(_failure(trace, used, Category.FRICTION, name, text))
         peak = float(np.abs(trace.w_commanded_C[:, i, N]).max())
-        allowed = limits.force_error * peak
+        share = limits.force_error if hand else limits.support_force_error
+        allowed = share * peak
         if peak > 0.0 and not off.any() and contact.force_error_rms_n > allowed:
             text = (
                 f"Contact {name} followed its commanded normal force only to "
@@ -138,12 +139,13 @@ class Checks:
         )
         off = rms(np.linalg.norm(measured - commanded, axis=1))
         peak = float(np.linalg.norm(commanded, axis=1).max())
-        if math.isinf(self._limits.force_error) or off <= self._limits.force_error * peak:
+        allowed = self._limits.support_force_error * peak
+        if off <= allowed or math.isinf(allowed):
             return []
         names = " and ".join(self._scenario.contact_names[i] for i in place)
         text = (
             f"Contacts {names} together followed their commanded force only to {off:.3g} N RMS "
-            f"(allowed {self._limits.force_error * peak:.3g} N)."
+            f"(allowed {allowed:.3g} N)."
         )
         return [_failure(trace, held, Category.FORCE, names, text)]
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, fields
 
 import numpy as np
+from numpy.typing import NDArray
 
 from fulcrum.sim.model import ContactFrames, rotations, true_contacts
 from fulcrum.sim.motion import Schedule
@@ -42,6 +43,10 @@ class ContactHistory:
         """The history of consecutive blocks as one; at least one block."""
         names = [field.name for field in fields(ContactHistory)]
         return ContactHistory(**{n: np.concatenate([getattr(p, n) for p in parts]) for n in names})
+
+    def pick(self, rows: NDArray[np.intp]) -> ContactHistory:
+        """Return copies of the rows with the given indices."""
+        return ContactHistory(**{f.name: getattr(self, f.name)[rows] for f in fields(self)})
 
 
 class Monitor:

@@ -11,13 +11,14 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from fulcrum.assets.mjcf import LOOKS
 from fulcrum.assets.models import hand_spec, robot_spec
 from fulcrum.assets.packages import ModelError
 from fulcrum.sim.geometry import GRAVITY, Geom, read_mesh
 from fulcrum.sim.model.contacts import check_contacts
+from fulcrum.sim.model.links import is_solid, link_pairs
 from fulcrum.sim.model.object_path import check_supports
-from fulcrum.sim.scenario import Friction, Hand, Robot, Scenario
+from fulcrum.sim.model.stiffness import specify_stiffness
+from fulcrum.sim.scenario import ContactMaterial, Friction, Hand, Robot, Scenario
 from fulcrum.synthesis import InvalidInputError
 from fulcrum.synthesis.arrays import Array
 
@@ -58,7 +59,13 @@ def compose(scenario: Scenario, motion: ObjectMotion = ObjectMotion.FREE) -> muj
         _add_pairs(spec, scenario)
     scene = _compiled(spec)
     if motion is ObjectMotion.FREE:
-        for first, second in unwanted_pairs(scenario, scene):
+        specify_stiffness(spec, scene, pair_materials(scenario))
+        data = mujoco.MjData(scene)
+        for name, angle in scenario.posture.items():
+            data.joint(name).qpos[:] = angle
+        mujoco.mj_kinematics(scene, data)
+        unwanted = unwanted_pairs(scenario, scene) + object_pairs(scenario)
+        for first, second in unwanted + link_pairs(scenario, scene, data):
             spec.add_pair(geomname1=first, geomname2=second)
     _add_view(spec, scenario)
     return spec
@@ -101,9 +108,19 @@ def unwanted_pairs(scenario: Scenario, scene: mujoco.MjModel) -> list[tuple[str,
     ]
 
 
-def is_solid(geom: Any) -> bool:
-    """Whether a compiled scene's geom may touch others, rather than only show what a link is."""
-    return int(geom.group[0]) != LOOKS
+def object_pairs(scenario: Scenario) -> list[tuple[str, str]]:
+    """Pairs of the object's geoms and the environment's that must not touch.
+
+    Where the object may rest is named, by supports and rests, as a surface for all of its geoms.
+    """
+    named = {s.surface for s in scenario.supports} | {r.surface for r in scenario.rests}
+    return [
+        (own.name, other.name)
+        for other in scenario.environment
+        if other.solid and other.name not in named
+        for own in scenario.object.geoms
+        if own.solid
+    ]
 
 
 def joint_ranges(scene: mujoco.MjModel) -> NDArray[np.float64]:
@@ -266,38 +283,51 @@ def _add_object(spec: mujoco.MjSpec, scenario: Scenario, motion: ObjectMotion) -
         _add_geom(spec, body, geom)
 
 
+def pair_materials(scenario: Scenario) -> dict[str, ContactMaterial]:
+    """Materials of the pairs that are to touch, by the pair's name."""
+    return {_pair_name(*pair): material for pair, (_, material) in _wanted_pairs(scenario).items()}
+
+
+def _wanted_pairs(
+    scenario: Scenario,
+) -> dict[tuple[str, str], tuple[Friction, ContactMaterial]]:
+    """Pairs of geoms that are to touch, the hand's or the surface's first, and how they do.
+
+    Raises:
+        InvalidInputError: Contacts of the same pair contradict each other.
+    """
+    wanted = {(tip_geom(h), h.geom): (h.friction, h.material) for h in scenario.hands}
+    placed = [(s.name, s.surface, s.geom, s.friction, s.material) for s in scenario.supports]
+    placed += [("rest", r.surface, r.geom, r.friction, r.material) for r in scenario.rests]
+    for name, surface, geom, friction, material in placed:
+        known = wanted.setdefault((surface, geom), (friction, material))
+        for field, given, other in zip(
+            ("friction", "material"), (friction, material), known, strict=True
+        ):
+            if given != other:
+                valid = f"{other}, as at other contacts of {geom} on {surface}"
+                raise InvalidInputError(f"{name}.{field}", given, valid)
+    return wanted
+
+
+def _pair_name(first: str, second: str) -> str:
+    return f"{first}-{second}"
+
+
 def _add_pairs(spec: mujoco.MjSpec, scenario: Scenario) -> None:
-    """Explicit pairs: without them friction is the larger of the two geoms'."""
-    for hand in scenario.hands:
-        _add_pair(spec, scenario, tip_geom(hand), hand.geom, hand.friction)
-    frictions: dict[tuple[str, str], Friction] = {}
-    placed = [(s.name, s.surface, s.geom, s.friction) for s in scenario.supports]
-    placed += [("rest", r.surface, r.geom, r.friction) for r in scenario.rests]
-    for name, surface, geom, friction in placed:
-        known = frictions.setdefault((surface, geom), friction)
-        if known != friction:
-            valid = f"{known}, as at other contacts of {geom} on {surface}"
-            raise InvalidInputError(f"{name}.friction", friction, valid)
-    for (surface, geom), friction in frictions.items():
-        _add_pair(spec, scenario, surface, geom, friction)
+    """Explicit pairs: without them friction is the larger of the two geoms'.
 
-
-def _add_pair(
-    spec: mujoco.MjSpec, scenario: Scenario, first: str, second: str, friction: Friction
-) -> None:
-    """An elliptic cone with condim 4 is exactly SFCE, (2) of the paper; with condim 3 PCWF, (1)."""
-    physics = scenario.physics
-    torsion = 0.0 if friction.e_n is None else friction.mu * friction.e_n
-    spec.add_pair(
-        name=f"{first}-{second}",
-        geomname1=first,
-        geomname2=second,
-        condim=3 if friction.e_n is None else 4,
-        friction=[friction.mu, friction.mu, torsion, 0.0, 0.0],
-        solref=physics.solref,
-        solreffriction=physics.solref_friction,
-        solimp=[*physics.solimp, 0.5, 2.0],
-    )
+    An elliptic cone with condim 4 is exactly SFCE, (2) of the paper; with condim 3 PCWF, (1).
+    """
+    for (first, second), (friction, _) in _wanted_pairs(scenario).items():
+        torsion = 0.0 if friction.e_n is None else friction.mu * friction.e_n
+        spec.add_pair(
+            name=_pair_name(first, second),
+            geomname1=first,
+            geomname2=second,
+            condim=3 if friction.e_n is None else 4,
+            friction=[friction.mu, friction.mu, torsion, 0.0, 0.0],
+        )
 
 
 def _add_view(spec: mujoco.MjSpec, scenario: Scenario) -> None:

@@ -6,7 +6,7 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from fulcrum.sim.model import tip_geom, unwanted_pairs
+from fulcrum.sim.model import tip_geom
 from fulcrum.sim.scenario import Scenario
 from fulcrum.synthesis.arrays import Array
 
@@ -100,8 +100,10 @@ class ContactReader:
         self._geoms = [model.geom(g).name for g in range(model.ngeom)]
         self._is_object = np.isin(self._geoms, [g.name for g in scenario.object.geoms])
         self._unwanted = np.zeros((model.ngeom, model.ngeom), bool)
-        for first, second in unwanted_pairs(scenario, model):
-            self._set(self._unwanted, first, second, True)
+        # Pairs that are to touch have names.
+        for i in (i for i in range(model.npair) if not model.pair(i).name):
+            a, b = int(model.pair_geom1[i]), int(model.pair_geom2[i])
+            self._unwanted[a, b] = self._unwanted[b, a] = True
         # Which hand's contact a pair of geoms is; -1 for none.
         self._hand = np.full((model.ngeom, model.ngeom), -1)
         for i, hand in enumerate(scenario.hands):

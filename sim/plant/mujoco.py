@@ -9,7 +9,8 @@ import mujoco
 import numpy as np
 from dm_control.rl.control import PhysicsError
 
-from fulcrum.sim.model import compose, rotations
+from fulcrum.sim.model import compose, pair_materials, rotations, set_stiffness
+from fulcrum.sim.plant.centripetal import Centripetal
 from fulcrum.sim.plant.contact_log import ContactLog, ContactReader
 from fulcrum.sim.plant.motion_log import MotionLog
 from fulcrum.sim.plant.protocol import DivergedError
@@ -23,6 +24,25 @@ with warnings.catch_warnings():  # dm_control looks for a display on import; non
     warnings.simplefilter("ignore")
     from dm_control import mujoco as dm_mujoco
     from dm_control.mujoco import wrapper
+
+
+class _Physics(dm_mujoco.Physics):
+    """dm_control's Physics whose steps are those of the plant."""
+
+    centripetal: Centripetal
+
+    def step(self, nstep: int = 1) -> None:
+        """Steps the physics; see dm_control."""
+        with self.check_invalid_state():
+            for _ in range(nstep):
+                self.advance()
+
+    def advance(self) -> None:
+        """One step, without dm_control's look for warnings, which takes a sixth as long."""
+        model, data = self.model.ptr, self.data.ptr
+        mujoco.mj_step1(model, data)
+        self.centripetal.add(data)
+        mujoco.mj_step2(model, data)
 
 
 class MujocoPlant:
@@ -46,7 +66,7 @@ class MujocoPlant:
         Raises:
             InvalidInputError: Scenario or world contradict themselves or each other.
         """
-        self.physics = dm_mujoco.Physics.from_model(wrapper.MjModel(compose(scenario).compile()))
+        self.physics = _Physics.from_model(wrapper.MjModel(compose(scenario).compile()))
         self.physics.legacy_step = False  # else new contacts would be read with old forces
         self._model, self._data = self.physics.model.ptr, self.physics.data.ptr
         data, model = self._data, self._model
@@ -54,6 +74,8 @@ class MujocoPlant:
         self._warnings, self._ctrl = data.warning.number, data.ctrl
         self._numbers = data.qpos, data.qvel, data.actuator_force
         make_true(model, scenario, world)
+        set_stiffness(model, pair_materials(scenario))
+        self.physics.centripetal = Centripetal(scenario, model)
         joints = [int(model.actuator(i).trnid[0]) for i in range(model.nu)]
         self.joints = tuple(model.joint(j).name for j in joints)
         self._q = model.jnt_qposadr[joints].copy()
@@ -122,8 +144,7 @@ class MujocoPlant:
     def step(self) -> None:
         """See :meth:`Plant.step`."""
         t = self._data.time  # which MuJoCo sets back where it finds the state beyond all numbers
-        # As dm_control's own step, whose search for warnings takes a sixth as long as the step.
-        mujoco.mj_step(self._model, self._data)
+        self.physics.advance()
         if np.count_nonzero(self._warnings):
             raise DivergedError(t)
         self.log()

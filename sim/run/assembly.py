@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from fulcrum.sim.control import ForceController
-from fulcrum.sim.plant import MujocoPlant
+from fulcrum.sim.plant import Engine, make_plant
 from fulcrum.sim.run.loop import ClosedLoop
 from fulcrum.sim.run.preparation import Preparation, prepare
 from fulcrum.sim.scenario import Control, Scenario
@@ -17,6 +17,7 @@ def closed_loop(
     world: World = NO_DEVIATION,
     truth: Scenario | None = None,
     seed: int = 0,
+    engine: Engine = Engine.MUJOCO,
     best_effort: bool = False,
 ) -> ClosedLoop:
     """Return a loop that is ready to run.
@@ -28,6 +29,7 @@ def closed_loop(
         world: How the plant deviates from the truth, and what disturbs it; nothing by default.
         truth: What the plant is but for the world; the scenario if left out.
         seed: Draws the deviations of the start posture.
+        engine: What simulates the plant.
         best_effort: Whether forces nearest to balance are applied where none balance the object.
 
     Raises:
@@ -43,7 +45,7 @@ def closed_loop(
         scenario,
         prepared.robot,
         truth,
-        MujocoPlant(truth, world),
+        make_plant(engine, truth, world),
         ForceController(control, path, grip, Channel(world), best_effort),
         world,
         path.start,

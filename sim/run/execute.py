@@ -16,7 +16,7 @@ from typing import Any
 
 from fulcrum.sim.evaluation import ContactHistory, Judge, Monitor, Report, RunInfo
 from fulcrum.sim.planning import Planning
-from fulcrum.sim.plant import DivergedError
+from fulcrum.sim.plant import DivergedError, Engine
 from fulcrum.sim.recording import Recorder, open_viewer
 from fulcrum.sim.run.assembly import closed_loop
 from fulcrum.sim.run.files import check_new_folder, finite, write_json
@@ -48,6 +48,7 @@ class Request:
         planning: How the tilt is planned; None for the scenario's own timing.
         disturbed: Whether the scenario's tolerances for disturbed runs count; if None, they do
             where the world is not as believed.
+        engine: What simulates the plant.
     """
 
     scenario: Scenario
@@ -60,6 +61,7 @@ class Request:
     world: World = NO_DEVIATION
     planning: Planning | None = None
     disturbed: bool | None = None
+    engine: Engine = Engine.MUJOCO
 
     def __post_init__(self) -> None:
         _ = self.settings  # a name that stands for none is refused
@@ -138,6 +140,7 @@ def execute(
         request.world,
         seed=request.seed,
         best_effort=request.best_effort,
+        engine=request.engine,
     )
     truth, robot = loop.truth, loop.robot
     monitor, limits = Monitor(truth), (robot.tau_min, robot.tau_max)
@@ -232,6 +235,7 @@ def resolved_config(request: Request) -> dict[str, Any]:
     return finite(
         {
             "controller": request.name,
+            "engine": request.engine.value,
             "seed": request.seed,
             "disturbed": request.judged_as_disturbed,
             "control": dataclasses.asdict(request.settings),

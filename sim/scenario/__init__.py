@@ -9,6 +9,7 @@ from fulcrum.sim.scenario.control import (
     controllers,
     default_controller,
 )
+from fulcrum.sim.scenario.material import PAD, SUPPORT, ContactMaterial
 from fulcrum.sim.scenario.path import Angle, Pivot, Poses
 from fulcrum.sim.scenario.phases import (
     HOLD,

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from typing import Annotated
 
 from fulcrum.sim.geometry import Pose
+from fulcrum.sim.scenario.material import PAD, SUPPORT, ContactMaterial
 from fulcrum.synthesis import InvalidInputError
 from fulcrum.synthesis.arrays import Vector
 from fulcrum.synthesis.checks import axes, vector
@@ -21,7 +22,8 @@ class Friction(Settings):
     """Coefficient of friction [-]."""
 
     e_n: Annotated[Positive | None, Key("torsion_m")] = None
-    """Torsional over tangential friction [m], of a soft contact; a hard point without it."""
+    """Torsional over tangential friction [m], of a soft contact: two thirds of the radius of a
+    round pad under even pressure; a hard point without it."""
 
 
 @dataclass(frozen=True)
@@ -43,6 +45,7 @@ class Hand:
         friction: Between tip and object.
         f_n_max: Largest allowed normal force [N].
         mount_pose: Of the body ``pad`` on the mount.
+        material: Of tip and object against each other.
     """
 
     name: str
@@ -55,6 +58,7 @@ class Hand:
     friction: Friction
     f_n_max: float = math.inf
     mount_pose: Pose = Pose()
+    material: ContactMaterial = PAD
 
     def __post_init__(self) -> None:
         axes(self.name, ("normal_O", self.normal_O), ("tangent_O", self.tangent_O))
@@ -75,6 +79,7 @@ class Support:
         normal_W: Surface normal in world axes, into the object.
         tangent_W: First tangent in world axes, perpendicular to the normal.
         friction: Between object and surface.
+        material: Of object and surface against each other.
     """
 
     name: str
@@ -84,6 +89,7 @@ class Support:
     normal_W: Vector
     tangent_W: Vector
     friction: Friction
+    material: ContactMaterial = SUPPORT
 
     def __post_init__(self) -> None:
         axes(self.name, ("normal_W", self.normal_W), ("tangent_W", self.tangent_W))
@@ -98,8 +104,10 @@ class Rest:
         geom: The object's geom that touches.
         surface: Name of the environment's geom that is touched.
         friction: Between object and surface.
+        material: Of object and surface against each other.
     """
 
     geom: str
     surface: str
     friction: Friction
+    material: ContactMaterial = SUPPORT

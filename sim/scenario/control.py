@@ -96,8 +96,9 @@ class Control(Settings):
     bandwidth: Annotated[NotNegative, Key("bandwidth_rad_s")] = 30.0
     """Natural frequency of the joint impedance, which is critically damped [rad/s]."""
 
-    yielding_squeeze: bool = False
-    """Whether the impedance leaves the hands' squeeze to the feed-forward."""
+    yielding_squeeze: bool = True
+    """Whether the impedance leaves the hands' squeeze to the feed-forward; else it holds back hands
+    that sink into soft contacts."""
 
     robustness: Robustness | None = None
     """What the grip has to bear beyond the fixed margins of friction_factor and preload_n;
@@ -135,7 +136,6 @@ def controllers(control: Control) -> dict[str, Control]:
             control,
             robustness=_ROBUSTNESS,
             bandwidth=5.0 * control.bandwidth,
-            yielding_squeeze=True,
             pose_filter_s=0.05,
         ),
         "dynamic": replace(
@@ -143,7 +143,6 @@ def controllers(control: Control) -> dict[str, Control]:
             inertia=True,
             solve_every=1,
             bandwidth=150.0,
-            yielding_squeeze=True,
             pose_filter_s=0.05,
         ),
         "margin": control,

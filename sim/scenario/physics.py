@@ -8,43 +8,28 @@ from typing import Annotated
 
 from annotated_types import Ge, Gt, Le
 
-from fulcrum.synthesis import InvalidInputError
 from fulcrum.synthesis.settings import Key, Positive, Settings, Unlimited
 
 # A run's steps are to be counted, and kept.
 TimeStep = Annotated[float, Ge(1e-5), Le(1.0), Key("timestep_s")]
 # As many iterations per step as a run can wait for.
 Iterations = Annotated[int, Ge(0), Le(10_000)]
-TimeAndDamping = tuple[Positive, Positive]
 
 
 @dataclass(frozen=True)
 class Physics(Settings):
-    """Settings of the contact solver; the defaults keep creep under 0.001 µm/s."""
+    """Settings of the contact solver; the defaults decide neither how a run ends nor the forces."""
 
     timestep: TimeStep = 0.001
     """Time step [s]."""
 
-    impratio: Positive = 100.0
+    # Friction rows yield with its inverse. With 100 an edge of a shipped scene carries 2.6 % of its
+    # peak (RMS) more or less without noslip than with it, with 1e4 0.1 %.
+    impratio: Positive = 1e4
     """Frictional to normal constraint impedance [-]."""
 
     noslip_iterations: Iterations = 10
     """Iterations of the noslip post-processing."""
-
-    solref: TimeAndDamping = (0.01, 1.0)
-    """Contact time constant [s] and damping ratio [-]."""
-
-    solimp: tuple[Positive, Positive, Positive] = (0.99, 0.99, 0.001)
-    """Contact impedance d0 and dmax [-], and width [m]."""
-
-    solref_friction: TimeAndDamping = (0.002, 1.0)
-    """Time constant [s] and damping ratio [-] of the friction directions."""
-
-    def __post_init__(self) -> None:
-        d0, dmax = self.solimp[:2]
-        if not 0.0 < d0 <= dmax < 1.0:
-            raise InvalidInputError("physics.solimp", self.solimp, "0 < d0 <= dmax < 1")
-        super().__post_init__()
 
 
 # None, where it is infinite.
@@ -78,9 +63,12 @@ class Judged(Settings):
     """Friction utilisation in the plant [-]; not of supports that hold the same point, which share
     it as they happen to."""
 
-    force_error: Limit = 0.02
-    """RMS of measured minus commanded normal force, over the peak commanded one [-]; of supports
-    that hold the same point that of their force together."""
+    force_error: Limit = 0.03
+    """RMS of a hand's measured minus commanded normal force, over the peak commanded one [-]."""
+
+    support_force_error: Limit = 0.05
+    """The same of a support [-]; of supports that hold the same point that of their force
+    together."""
 
     saturated_s: LimitOrZero = 0.0
     """How long a torque may be cut at its limit at a stretch [s]."""
@@ -113,6 +101,7 @@ class Disturbed(Judged):
     spin_deg: Limit = math.inf
     utilisation: Limit = math.inf
     force_error: Limit = math.inf
+    support_force_error: Limit = math.inf
     saturated_s: LimitOrZero = 0.05
     support_lost_s: LimitOrZero = math.inf
     impact: Limit = math.inf

@@ -168,7 +168,7 @@ class Scenario:
 
 def lifted(scenario: Scenario) -> Scenario:
     """The scenario without its environment contacts: the object lies there, but is to come off."""
-    rests = {Rest(s.geom, s.surface, s.friction) for s in scenario.supports}
+    rests = {Rest(s.geom, s.surface, s.friction, s.material) for s in scenario.supports}
     rests |= set(scenario.rests)
     ordered = tuple(sorted(rests, key=lambda rest: (rest.surface, rest.geom)))
     return replace(scenario, supports=(), rests=ordered, holdable=False)

@@ -86,6 +86,7 @@ PARAMETERS = {
         Parameter("orientation_noise", "rad", "orientation_noise"),
         Parameter("encoder_noise", "rad or m", "encoder_noise"),
         Parameter("torque_noise", "share", "torque_noise"),
+        Parameter("stiffness", "factor", "stiffness", _all),
     )
 }
 # Gravity is what it is: a factor on the weight is one on the mass.

@@ -43,6 +43,8 @@ class Uncertainty:
         pushes: How many pushes there are while the object is held with full grip.
         push: Largest force of a push [N]; direction and place on the object are random.
         push_s: Duration of a push [s].
+        stiffness_down, stiffness_up: Shares by which each hand's contact may be softer, or stiffer,
+            log-uniformly [-].
     """
 
     mass: float = 0.0
@@ -64,10 +66,13 @@ class Uncertainty:
     pushes: int = 0
     push: float = 0.0
     push_s: float = 0.2
+    stiffness_down: float = 0.0
+    stiffness_up: float = 0.0
 
     def __post_init__(self) -> None:
         each("uncertainty", self, not_negative)
-        for name in ("mass", "size", "friction_down", "link_mass", "torque_gain", "dropped"):
+        shares = ("mass", "size", "friction_down", "link_mass", "torque_gain", "dropped")
+        for name in (*shares, "stiffness_down"):
             if not getattr(self, name) < 1.0:
                 raise InvalidInputError(f"uncertainty.{name}", getattr(self, name), "in [0, 1)")
         whole("uncertainty.pushes", self.pushes, least=0)
@@ -85,6 +90,8 @@ LAB = Uncertainty(
     orientation_noise=math.radians(0.2),
     latency=0.001,
     torque_gain=0.02,
+    stiffness_down=0.3,
+    stiffness_up=0.4,
 )
 FIELD = Uncertainty(
     mass=0.20,
@@ -99,6 +106,8 @@ FIELD = Uncertainty(
     torque_gain=0.05,
     pushes=2,
     push=5.0,
+    stiffness_down=0.5,
+    stiffness_up=1.0,
 )
 HARSH = replace(
     FIELD,
@@ -110,6 +119,8 @@ HARSH = replace(
     latency=0.005,
     torque_gain=0.10,
     push=10.0,
+    stiffness_down=0.75,
+    stiffness_up=3.0,
 )
 PRESETS = {"nominal": NOMINAL, "lab": LAB, "field": FIELD, "harsh": HARSH}
 
@@ -152,6 +163,8 @@ def draw(uncertainty: Uncertainty, scenario: Scenario, seed: int) -> World:
     offset = within(u.torque_offset, joints) * limits
     bounds = object_bounds(scenario, scene)
     pushes = tuple(_push(u, scenario, bounds, random) for _ in range(u.pushes))
+    low, high = math.log(1.0 - u.stiffness_down), math.log(1.0 + u.stiffness_up)
+    stiffness = np.exp(random.uniform(low, high, len(scenario.hands)))
     return World(
         seed=seed,
         mass=mass,
@@ -170,6 +183,7 @@ def draw(uncertainty: Uncertainty, scenario: Scenario, seed: int) -> World:
         latency=u.latency,
         dropped=u.dropped,
         pushes=pushes,
+        stiffness=tuple(stiffness.tolist()),
     )
 
 

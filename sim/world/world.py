@@ -70,6 +70,7 @@ class World:
         pushes: Forces on the object.
         obstacles: What stands in the world besides the environment that is believed.
         faults: What breaks during the run.
+        stiffness: Factors on the stiffness of each hand's contact [-], (n,).
     """
 
     seed: int = 0
@@ -91,6 +92,7 @@ class World:
     pushes: tuple[Push, ...] = ()
     obstacles: tuple[Geom, ...] = ()
     faults: tuple[Fault, ...] = ()
+    stiffness: tuple[float, ...] = ()
 
     def __post_init__(self) -> None:
         if self.seed < 0:
@@ -99,7 +101,7 @@ class World:
         if not 1e-3 <= self.size <= 1e3:  # its square is to be a number
             raise InvalidInputError("world.size", self.size, "in [0.001, 1000]")
         vector("world.center_of_mass", self.center_of_mass, 3)
-        for name in ("friction", "link_mass", "torque_gain"):
+        for name in ("friction", "link_mass", "torque_gain", "stiffness"):
             for factor in getattr(self, name):
                 positive(f"world.{name}", factor)
         for friction in self.joint_friction:
@@ -134,9 +136,11 @@ class World:
         n, contacts = len(scenario.hands), len(scenario.contact_names)
         _check_length("friction", self.friction, contacts)
         _check_length("hand_place", self.hand_place, n)
+        _check_length("stiffness", self.stiffness, n)
         friction = self.friction or (1.0,) * contacts
         places = self.hand_place or ((0.0, 0.0),) * n
-        hands = tuple(map(self._hand, scenario.hands, friction[:n], places))
+        stiffness = self.stiffness or (1.0,) * n
+        hands = tuple(map(self._hand, scenario.hands, friction[:n], places, stiffness))
         supports = tuple(map(self._support, scenario.supports, friction[n:]))
         return replace(
             scenario,
@@ -167,10 +171,17 @@ class World:
             shape=None if thing.shape is None else thing.shape.scaled(self.size),
         )
 
-    def _hand(self, hand: Hand, friction: float, place: tuple[float, float]) -> Hand:
+    def _hand(
+        self, hand: Hand, friction: float, place: tuple[float, float], stiffness: float
+    ) -> Hand:
         p_OC_O = self.size * np.asarray(hand.p_OC_O)
         p_OC_O += contact_axes(hand.normal_O, hand.tangent_O)[:, :2] @ place
-        return replace(hand, friction=_slipperier(hand.friction, friction), p_OC_O=triple(p_OC_O))
+        return replace(
+            hand,
+            friction=_slipperier(hand.friction, friction),
+            p_OC_O=triple(p_OC_O),
+            material=hand.material.scaled(stiffness),
+        )
 
     def _support(self, support: Support, friction: float) -> Support:
         return replace(

@@ -36,6 +36,18 @@ BROKEN = {
     "truth as number": Broken("angle_deg = 90.0", "angle_deg = true", "path.angle_deg", "a number"),
     "a date": Broken(WEIGHT, "weight_n = 2026-11-22", "object.weight_n", "a number"),
     "table as number": Broken("friction = { mu = 0.4 }", "friction = 0.4", "friction", "a table"),
+    "contact given twice": Broken(
+        LEFT_TIP,
+        f"contact = {{ stiffness_n_per_m = 4e4, radius_m = 0.03 }}\n{LEFT_TIP}",
+        "hands.left.contact.stiffness_n_per_m",
+        "left out where there is radius_m",
+    ),
+    "contact given in part": Broken(
+        LEFT_TIP,
+        f"contact = {{ youngs_modulus_pa = 2e6, load_n = 50 }}\n{LEFT_TIP}",
+        "hands.left.contact.youngs_modulus_pa",
+        "together with radius_m",
+    ),
     "list of tables": Broken("[manoeuvre]", "[[manoeuvre]]", "manoeuvre", "a table"),
     "one number too few": Broken(BOX_SIZE, "size_m = [0.3, 0.2]", "object.size_m", "3 values"),
     "missing key": Broken(BOX_SIZE, "", "object.size_m", "a value for this key"),

@@ -14,8 +14,12 @@ from fulcrum.sim.model.object_path import ScrewPath
 from fulcrum.sim.model.robot_model import RobotModel
 from fulcrum.sim.motion.ik import plan_joints
 from fulcrum.sim.plant.mujoco import MujocoPlant
+from fulcrum.sim.scenario.material import ContactMaterial
 
-BOX = scenario("box-tilt")
+# Pads as stiff as hard plastic: the impedance below holds back hands that sink in.
+STIFF = ContactMaterial(1.5e6, 0.002)
+SOFT_BOX = scenario("box-tilt")
+BOX = replace(SOFT_BOX, hands=tuple(replace(hand, material=STIFF) for hand in SOFT_BOX.hands))
 WEIGHT = BOX.object.mass * GRAVITY
 ROBOT = RobotModel(BOX)
 FRAMES = ContactFrames(BOX)

@@ -17,6 +17,7 @@ from fulcrum.sim.motion.schedule import Schedule
 from fulcrum.sim.run.environment import make_environment
 from fulcrum.sim.run.execute import Request, execute
 from fulcrum.sim.scenario.contacts import Friction
+from fulcrum.sim.scenario.material import ContactMaterial
 from fulcrum.sim.scenario.phases import stretched
 from fulcrum.sim.scenario.physics import Physics, Tolerances
 from fulcrum.synthesis import InvalidInputError
@@ -156,10 +157,8 @@ def test_a_hand_model_that_is_not_shipped_is_refused_by_name():
         ("friction.e_n", lambda v: Friction(mu=0.1, e_n=v)),
         ("physics.timestep", lambda v: Physics(timestep=v)),
         ("physics.impratio", lambda v: Physics(impratio=v)),
-        ("physics.solref", lambda v: Physics(solref=(v, 1.0))),
-        ("physics.solref", lambda v: Physics(solref=(0.01, v))),
-        ("physics.solref_friction", lambda v: Physics(solref_friction=(v, 1.0))),
-        ("physics.solimp", lambda v: Physics(solimp=(0.9, 0.95, v))),
+        ("material.stiffness", lambda v: ContactMaterial(v, 0.002)),
+        ("material.damping_s", lambda v: ContactMaterial(4e4, v)),
     ],
 )
 def test_what_must_be_a_finite_number_above_0_is_refused_by_name(field, make, value):
@@ -175,12 +174,6 @@ def test_noslip_iterations_that_are_no_count_are_refused_by_name(value):
         InvalidInputError, match=rf"^physics\.noslip_iterations: got {value}; valid"
     ):
         Physics(noslip_iterations=value)
-
-
-@pytest.mark.parametrize(("d0", "dmax"), [(0.0, 0.9), (0.95, 0.9), (0.9, 1.0), (math.nan, 0.9)])
-def test_impedances_out_of_order_are_refused_by_name(d0, dmax):
-    with pytest.raises(InvalidInputError, match=r"^physics\.solimp: got .*; valid is 0 < d0 <="):
-        Physics(solimp=(d0, dmax, 0.001))
 
 
 HAND, SUPPORT = BOX.hands[0], BOX.supports[0]
@@ -312,8 +305,8 @@ def test_a_run_off_the_main_thread_runs():
     short = replace(BOX, phases=stretched(BOX.phases, 5.0))
     with ThreadPoolExecutor(1) as pool:
         report = pool.submit(execute, Request(short, "margin", short.control)).result().report
-    # A 5 s tilt slides by 0.12 mm: it ran, and was judged.
-    assert any("slid" in failure for failure in report.sentences)
+    # It ran, and was judged.
+    assert report.tilt.final_deg == pytest.approx(90.0, abs=0.2)
 
 
 def test_time_between_actions_must_be_whole_steps():
