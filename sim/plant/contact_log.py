@@ -97,6 +97,7 @@ class ContactReader:
 
     def __init__(self, scenario: Scenario, model: mujoco.MjModel) -> None:
         self.collisions: dict[tuple[str, str], float] = {}
+        self._dt = float(model.opt.timestep)
         self._geoms = [model.geom(g).name for g in range(model.ngeom)]
         self._is_object = np.isin(self._geoms, [g.name for g in scenario.object.geoms])
         self._unwanted = np.zeros((model.ngeom, model.ngeom), bool)
@@ -155,7 +156,8 @@ class ContactReader:
             sums = np.bincount(place, component, minlength=wrenches[..., i].size)
             wrenches[..., i] = sums.reshape(wrenches.shape[:2])
         positions[where] = point[ours]
-        return self._count_collisions(step, geoms, log.t, len(p_WO))
+        # A contact belongs to the state before its step.
+        return self._count_collisions(step, geoms, log.t - self._dt, len(p_WO))
 
     def _contact(
         self, step: NDArray, geoms: NDArray, point: Array, p_WO: Array, R_WO: Array

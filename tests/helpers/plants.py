@@ -15,6 +15,7 @@ from fulcrum.sim.model.robot_model import RobotModel
 from fulcrum.sim.motion.ik import plan_joints
 from fulcrum.sim.plant.mujoco import MujocoPlant
 from fulcrum.sim.scenario.material import ContactMaterial
+from fulcrum.sim.signals.trace import Trace
 
 # Pads as stiff as hard plastic: the impedance below holds back hands that sink in.
 STIFF = ContactMaterial(1.5e6, 0.002)
@@ -23,7 +24,7 @@ BOX = replace(SOFT_BOX, hands=tuple(replace(hand, material=STIFF) for hand in SO
 WEIGHT = BOX.object.mass * GRAVITY
 ROBOT = RobotModel(BOX)
 FRAMES = ContactFrames(BOX)
-HANDS = len(BOX.hands)
+HANDS, CONTACTS = len(BOX.hands), len(BOX.contact_names)
 # Joint impedance that keeps the arms where they are while they push [rad/s].
 BANDWIDTH = 30.0
 
@@ -52,14 +53,28 @@ def rotation_of(measurement):
     return Rotation.from_quat(measurement.quat_WO, scalar_first=True).as_matrix()
 
 
-def push(plant, q_d, f_n, steps):
-    """Steps with a feed-forward for normal forces f_n [N], (2,), around angles q_d."""
-    for _ in range(steps):
+def stepped(plant, steps, torques=None, contacts=CONTACTS):
+    """The block of steps with torques(measurement), or with those that are applied already."""
+    block = Trace.allocate(steps, len(plant.joints), HANDS, contacts)
+    for row in range(steps):
         m = plant.measure()
+        block.t[row], block.p_WO[row], block.quat_WO[row] = m.t, m.p_WO, m.quat_WO
+        if torques is not None:
+            plant.apply(torques(m))
+        plant.step()
+    plant.contacts(block)
+    return block
+
+
+def push(plant, q_d, f_n, steps):
+    """The block of steps with a feed-forward for normal forces f_n [N], (2,), around angles q_d."""
+
+    def torques(m):
         R_WO = rotation_of(m)
         robot = ROBOT.at(m.q)
         p_WC, R_WC = FRAMES.points(R_WO, m.p_WO)[:HANDS], FRAMES.in_world(R_WO)[:HANDS]
         forces = np.einsum("nl,n->l", robot.contact_jacobians(p_WC, R_WC)[:, 2], f_n)
         impedance = BANDWIDTH**2 * (q_d - m.q) - 2.0 * BANDWIDTH * m.qd
-        plant.apply(robot.tau_g + forces + robot.mass_matrix() @ impedance)
-        plant.step()
+        return robot.tau_g + forces + robot.mass_matrix() @ impedance
+
+    return stepped(plant, steps, torques)

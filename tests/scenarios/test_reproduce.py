@@ -6,7 +6,12 @@ import numpy as np
 import pytest
 
 from fulcrum.scenarios import scenario
-from fulcrum.scenarios.paper.cases import FORCE_OBJECTIVES, TORQUE_OBJECTIVES, paper_cylinder, sweep
+from fulcrum.scenarios.paper.cases import (
+    FORCE_OBJECTIVES,
+    TORQUE_OBJECTIVES,
+    paper_cylinder,
+    tilt_curve,
+)
 from fulcrum.scenarios.paper.figures import Curve, Figure, draw
 from fulcrum.scenarios.paper.reproduce import closed_loop, grip_error
 from fulcrum.scenarios.paper.statements import all_statements
@@ -23,16 +28,16 @@ def statements():
 
     box, cylinder = scenario("box-tilt"), paper_cylinder()
     exact = controllers(box.control)["paper"]
-    box_sweeps = {
-        name: sweep(PathProblems(box, replace(exact, objective=objective)), TILTS)
+    box_curves = {
+        name: tilt_curve(PathProblems(box, replace(exact, objective=objective)), TILTS)
         for name, objective in (FORCE_OBJECTIVES | TORQUE_OBJECTIVES).items()
     }
     exact = controllers(cylinder.control)["paper"]
-    cylinder_sweeps = {
-        name: sweep(PathProblems(cylinder, replace(exact, objective=o), False), TILTS[:86])
+    cylinder_curves = {
+        name: tilt_curve(PathProblems(cylinder, replace(exact, objective=o), False), TILTS[:86])
         for name, o in FORCE_OBJECTIVES.items()
     }
-    return {s.statement: s for s in all_statements(box_sweeps, cylinder_sweeps)}
+    return {s.statement: s for s in all_statements(box_curves, cylinder_curves)}
 
 
 def test_what_the_paper_states_is_reproduced_but_for_two_numbers(statements):
@@ -89,7 +94,7 @@ def test_measured_grip_follows_the_computed_curve_within_3_percent(name):
 def test_an_infeasible_tilt_leaves_a_gap_and_no_number():
     cylinder = paper_cylinder()
     exact = controllers(cylinder.control)["paper"]
-    found = sweep(PathProblems(cylinder, exact, False), [84.0, 85.0, 86.0, 87.0])
+    found = tilt_curve(PathProblems(cylinder, exact, False), [84.0, 85.0, 86.0, 87.0])
     assert list(found.tilt_deg) == [84.0, 85.0]
 
 

@@ -8,7 +8,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from fulcrum.scenarios import scenario
-from fulcrum.sim.control.controller import Controller
+from fulcrum.sim.control.controller import ForceController
 from fulcrum.sim.control.observer import PoseObserver
 from fulcrum.sim.model.object_path import ScrewPath, minimum_jerk
 from fulcrum.sim.model.robot_model import RobotModel
@@ -202,7 +202,8 @@ def commanded(pose_filter_s, turn):
     tilt = schedule.at(t).tilt
     q = joint_path.holding(tilt)
     (p_WO,), (quat_WO,) = poses(BOX.path, [tilt])
-    controller = Controller(BOX, control, RobotModel(BOX), joint_path)
+    controller = ForceController(control, joint_path)
+    controller.reset(BOX, RobotModel(BOX), seed=0)
     turned = quat_WO.copy()
     mujoco.mju_quatIntegrate(turned, np.array([0.0, -turn, 0.0]), 1.0)
     rows, none = ((t, quat_WO), (t + T, turned)), np.zeros(len(q))

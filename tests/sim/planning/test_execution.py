@@ -7,18 +7,15 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from fulcrum.sim.control.replanning import Replanner
 
 from fulcrum.scenarios import scenario
 from fulcrum.scenarios.cli import main
 from fulcrum.scenarios.commands.common import chosen_planning
-from fulcrum.sim.motion.references import References
 from fulcrum.sim.planning.execution import Planning, planned_tilt
 from fulcrum.sim.run.execute import Request, execute
 from fulcrum.sim.run.preparation import Preparation
 from fulcrum.sim.scenario.control import controllers
 from fulcrum.sim.scenario.phases import Phase
-from fulcrum.sim.signals.measurement import Measurement
 from fulcrum.sim.sweep.design import Sweep
 from fulcrum.sim.sweep.episode import run_episode
 from fulcrum.sim.world.faults import Fault, FaultKind
@@ -129,53 +126,6 @@ def test_a_held_tilt_goes_on_by_a_new_plan_from_rest():
     assert abs(trace.rate_ref[after][0]) < 0.05
     assert np.diff(trace.tilt_ref).max() < 1.01 * TICK * trace.rate_ref.max()
     assert trace.rate_ref[after].max() > 1.0
-
-
-@pytest.fixture
-def half_way():
-    """A planner of the rest, a target half way, and its path time."""
-    planned = execution(BOX, 1.5)
-    t = float(planned.joint_path.schedule.starts[planned.phase] + 0.8)
-    return Replanner(planned), References(planned.joint_path, TICK).at(t), t
-
-
-def seen(q, qd):
-    return Measurement(0.0, q, qd, np.zeros(3), np.array([1.0, 0.0, 0.0, 0.0]), 0.0 * q)
-
-
-def test_arms_on_their_path_keep_their_timing(half_way):
-    replanner, target, _ = half_way
-    assert replanner.caught(target, seen(target.q, target.qd)) is None
-    # Nor does it matter how they deviate across it.
-    slope = replanner.joint_path.at(replanner.phase, target.tilt / (math.pi / 2))[1]
-    across = np.ones_like(slope) - slope * slope.sum() / slope.dot(slope)
-    assert replanner.behind(target, seen(target.q - 0.1 * across, target.qd)) < 1e-12
-
-
-def test_arms_that_fell_behind_go_on_from_where_they_are(half_way):
-    replanner, target, t = half_way
-    end, phase = math.pi / 2, replanner.phase
-    share = (target.tilt - math.radians(2.0)) / end
-    q, slope = replanner.joint_path.at(phase, share)
-    ends = replanner.joint_path.schedule.ends[phase]
-    anew = replanner.caught(target, seen(q, 0.4 * slope))
-    schedule = anew.joint_path.schedule
-    # Two degrees of the path are curved a little: by 1 % of them.
-    assert schedule.at(anew.path_t).tilt == pytest.approx(share * end, abs=math.radians(0.02))
-    just = schedule.at(anew.path_t + 1e-6)
-    assert just.rate == pytest.approx(0.4, rel=1e-2)
-    assert anew.path_t < t
-    # What is behind and slower than planned takes longer, and ends at rest.
-    assert schedule.ends[phase] - anew.path_t > ends - t
-    last = schedule.at(schedule.ends[phase] - 1e-9)
-    assert (float(last.tilt), float(last.rate)) == pytest.approx((end, 0.0), abs=1e-6)
-
-
-def test_the_timing_stays_where_there_is_no_other(half_way):
-    replanner, _, _ = half_way
-    assert replanner.planned(0.9, 50.0) is None
-    assert replanner.planned(0.995, 0.1) is None
-    assert replanner.planned(0.9, 0.1) is not None
 
 
 def test_a_manoeuvre_in_two_tilts_is_refused():

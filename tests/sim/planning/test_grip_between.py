@@ -11,8 +11,8 @@ from fulcrum.sim.model.grip import GripSchedule
 from fulcrum.sim.planning import robust_grip as planning
 from fulcrum.sim.planning.path_problems import PathProblems
 from fulcrum.sim.scenario.control import controllers
-from fulcrum.synthesis import Objective, RobustInfeasibleError
-from fulcrum.synthesis.robust.grip import robust_grip
+from fulcrum.synthesis import Objective
+from fulcrum.synthesis.robust import RobustInfeasibleError, robust_grip
 
 # The hands of these cannot hold the object at all.
 LIFTED = ("box-lift", "cylinder-lift")

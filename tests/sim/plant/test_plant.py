@@ -1,6 +1,5 @@
 """The plant's forces obey Newton, and what touches against the scenario's will is named."""
 
-import itertools
 from dataclasses import replace
 
 import mujoco
@@ -19,16 +18,9 @@ from tests.helpers.plants import (
     planned,
     plant_at,
     push,
-    rotation_of,
     start_at,
+    stepped,
 )
-
-
-def named_contacts(plant):
-    """Points and wrenches of the named contacts, (m, 3 | 4); NaN points where there are none."""
-    points, wrenches = np.full((4, 3), np.nan), np.full((4, 4), np.nan)
-    plant.contacts(points, wrenches)
-    return points, wrenches
 
 
 def every_contact(plant):
@@ -63,16 +55,15 @@ def alone():
 
 def test_box_at_rest_on_the_table_is_carried_by_its_four_corners():
     plant, q = alone()
-    push(plant, q, (0.0, 0.0), 500)
+    block = push(plant, q, (0.0, 0.0), 500)
     force, moment = every_contact(plant)
     # The solver's tolerance of 1e-10 on 20 N; measured 2e-14.
     np.testing.assert_allclose(force, [0.0, 0.0, WEIGHT], rtol=0, atol=1e-8)
     np.testing.assert_allclose(moment, 0.0, rtol=0, atol=1e-8)
-    _, wrenches = named_contacts(plant)
     # Only the two corners of the edge have names; the other half of the weight is on the others.
     expected = np.zeros((4, 4))
     expected[HANDS:, 2] = WEIGHT / 4.0
-    np.testing.assert_allclose(wrenches, expected, rtol=0, atol=1e-8)
+    np.testing.assert_allclose(block.f_W[-1], expected, rtol=0, atol=1e-8)
 
 
 def test_a_box_that_is_pulled_up_is_carried_by_less_than_its_weight():
@@ -84,9 +75,8 @@ def test_a_box_that_is_pulled_up_is_carried_by_less_than_its_weight():
 
 def test_squeezing_hands_push_equally_and_oppositely_with_the_force_fed_forward():
     plant, q = plant_at(0.0)
-    push(plant, q, (20.0, 20.0), 600)
-    points, wrenches = named_contacts(plant)
-    left, right = wrenches[:HANDS, 1]
+    block = push(plant, q, (20.0, 20.0), 600)
+    left, right = block.f_W[-1, :HANDS, 1]
     # The impedance takes its share of the 15 µm by which the contacts give: 0.5 %.
     assert -left == pytest.approx(20.0, rel=0.01)
     assert right == pytest.approx(-left, rel=1e-4)
@@ -94,25 +84,13 @@ def test_squeezing_hands_push_equally_and_oppositely_with_the_force_fed_forward(
     assert left < 0.0 < right
     expected = FRAMES.points(np.eye(3), np.array(BOX.path.start.position))
     # Contact points lie half-way into the overlap of 15 µm; the arms give a few µm sideways.
-    np.testing.assert_allclose(points, expected, rtol=0, atol=2e-5)
+    np.testing.assert_allclose(block.p_WC[-1], expected, rtol=0, atol=2e-5)
 
 
 def test_an_uneven_squeeze_is_caught_in_the_hand_forces():
     plant, q = plant_at(0.0)
-    push(plant, q, (21.0, 20.0), 600)
-    left, right = named_contacts(plant)[1][:HANDS, 1]
+    left, right = push(plant, q, (21.0, 20.0), 600).f_W[-1, :HANDS, 1]
     assert abs(left + right) > 1e-2
-
-
-def rows_of(plant, q, steps):
-    """Measurement before, and twist, points and wrenches during each of some steps."""
-    rows = []
-    for _ in range(steps):
-        measurement, twist = plant.measure(), np.zeros(6)
-        push(plant, q, (40.0, 40.0), 1)
-        plant.object_twist(twist)
-        rows.append((measurement, twist, *named_contacts(plant)))
-    return rows
 
 
 def balance_errors(plant, q, steps=30):
@@ -124,16 +102,18 @@ def balance_errors(plant, q, steps=30):
     """
     mass, inertia = BOX.object.mass, np.diag(BOX.object.inertia)
     dt = BOX.physics.timestep
-    rows, errors = rows_of(plant, q, steps + 1), []
-    for (m, twist, points, wrenches), (m_next, twist_next, _, _) in itertools.pairwise(rows):
-        R, R_next = rotation_of(m), rotation_of(m_next)
+    block, errors = push(plant, q, (40.0, 40.0), steps + 1), []
+    rotations = Rotation.from_quat(block.quat_WO, scalar_first=True).as_matrix()
+    for k in range(steps):
+        (R, R_next), (twist, twist_next) = rotations[k : k + 2], block.twist_WO[k : k + 2]
+        points, wrenches = block.p_WC[k], block.f_W[k]
         change = mass * (twist_next[:3] - twist[:3]) / dt
         force = wrenches[:, :3].sum(axis=0) - [0.0, 0.0, WEIGHT]
         # Euler's equation in the box's own axes, in which its inertia stays.
         omega, omega_next = R.T @ twist[3:], R_next.T @ twist_next[3:]
         spin_up = inertia @ (omega_next - omega) / dt + np.cross(omega, inertia @ omega)
         live = ~np.isnan(points[:, 0])
-        arm = np.cross(points[live] - m.p_WO, wrenches[live, :3]).sum(axis=0)
+        arm = np.cross(points[live] - block.p_WO[k], wrenches[live, :3]).sum(axis=0)
         torsion = (FRAMES.in_world(R)[..., 2] * wrenches[:, 3:]).sum(axis=0)
         errors.append(
             [
@@ -164,17 +144,13 @@ def test_named_contacts_of_a_moving_box_obey_newton_and_euler(tilt_deg):
 def test_twists_are_the_derivatives_of_their_poses():
     plant, q = plant_at(30.0)
     push(plant, q, (40.0, 40.0), 10)
-    p_WE, quat_WE, twist_WE = np.zeros((2, 2, 3)), np.zeros((2, 2, 4)), np.zeros((2, 2, 6))
-    p_WO, R_WO, twist_WO = np.zeros((2, 3)), np.zeros((2, 3, 3)), np.zeros((2, 6))
-    for k in range(2):
-        m = plant.measure()
-        p_WO[k], R_WO[k] = m.p_WO, rotation_of(m)
-        push(plant, q, (40.0, 40.0), 1)
-        plant.tips(p_WE[k], quat_WE[k], twist_WE[k])
-        plant.object_twist(twist_WO[k])
+    block = push(plant, q, (40.0, 40.0), 2)
+    p_WE, twist_WE = block.p_WE, block.twist_WE
+    p_WO, twist_WO = block.p_WO, block.twist_WO
     dt = BOX.physics.timestep
-    turn_O = Rotation.from_matrix(R_WO[1] @ R_WO[0].T).as_rotvec()
-    R_WE = Rotation.from_quat(quat_WE.reshape(4, 4), scalar_first=True)
+    R_WO = Rotation.from_quat(block.quat_WO, scalar_first=True)
+    turn_O = (R_WO[1] * R_WO[0].inv()).as_rotvec()
+    R_WE = Rotation.from_quat(block.quat_WE.reshape(4, 4), scalar_first=True)
     turn_E = (R_WE[2:] * R_WE[:2].inv()).as_rotvec()
     # A step is made with the speed after it: for the free box exactly, up to rounding over dt.
     np.testing.assert_allclose((p_WO[1] - p_WO[0]) / dt, twist_WO[1, :3], rtol=0, atol=1e-12)
@@ -190,10 +166,9 @@ def test_twists_are_the_derivatives_of_their_poses():
 def test_lost_contacts_have_no_force_and_leave_their_last_point():
     plant, _ = plant_at(0.0)
     plant.physics.data.joint("box").qpos[2] += 0.05
-    plant.physics.forward()
-    points, wrenches = named_contacts(plant)
-    np.testing.assert_array_equal(wrenches[HANDS:], 0.0)
-    assert np.isnan(points[HANDS:]).all()
+    block = stepped(plant, 1)
+    np.testing.assert_array_equal(block.f_W[0, HANDS:], 0.0)
+    assert np.isnan(block.p_WC[0, HANDS:]).all()
 
 
 def standing(geom, support):
@@ -206,11 +181,7 @@ def standing(geom, support):
     )
     plant = MujocoPlant(scene)
     plant.reset(np.zeros(0))
-    for _ in range(300):
-        plant.step()
-    points, wrenches = np.zeros((HANDS + 1, 3)), np.zeros((HANDS + 1, 4))
-    plant.contacts(points, wrenches)
-    return wrenches[HANDS]
+    return stepped(plant, 300, contacts=HANDS + 1).f_W[-1, HANDS]
 
 
 @pytest.mark.parametrize("kind", ["sphere", "box"])
@@ -258,24 +229,19 @@ def test_a_link_that_touches_what_stands_around_is_counted_and_named_with_the_ti
     # On the wrist's inner side, where it pushes the hand off the box instead of into it.
     plant = with_post(wrist_at(0.0, -0.03, 0.0))
     assert plant.collisions == {}
-    points, wrenches = np.zeros((4, 3)), np.zeros((4, 4))
-    assert plant.contacts(points, wrenches) > 0
+    block = stepped(plant, 1)
+    assert block.collisions[0] > 0
     (names,) = [pair for pair in plant.collisions if "left_wrist" in pair]
     assert set(names) == {"left_wrist", "post"}
     assert plant.collisions[names] == 0.0
     # It is no contact of the scenario: its force counts nowhere.
-    np.testing.assert_array_equal(wrenches[:HANDS], plant_wrenches_without_post()[:HANDS])
+    without_post = stepped(plant_at(30.0)[0], 1)
+    np.testing.assert_array_equal(block.f_W[0, :HANDS], without_post.f_W[0, :HANDS])
     # The first time stays, and a reset forgets it.
-    for _ in range(3):
-        plant.step()
-        plant.contacts(points, wrenches)
+    stepped(plant, 3)
     assert plant.collisions[names] == 0.0
     plant.reset(planned().holding(np.radians(30.0)))
     assert plant.collisions == {}
-
-
-def plant_wrenches_without_post():
-    return named_contacts(plant_at(30.0)[0])[1]
 
 
 def test_a_link_pushes_back_at_what_it_touches():
@@ -287,13 +253,13 @@ def test_a_link_pushes_back_at_what_it_touches():
 
 def test_a_post_beside_the_arm_is_touched_by_nothing():
     plant = with_post(wrist_at(0.0, 0.4, 0.0))
-    assert plant.contacts(np.zeros((4, 3)), np.zeros((4, 4))) == 0
+    assert not stepped(plant, 1).collisions.any()
     assert plant.collisions == {}
 
 
 def test_the_box_on_the_table_and_the_hands_on_the_box_are_no_collisions():
     plant, q = plant_at(0.0)
-    push(plant, q, (20.0, 20.0), 50)
-    assert plant.contacts(np.zeros((4, 3)), np.zeros((4, 4))) == 0
+    block = push(plant, q, (20.0, 20.0), 50)
+    assert not block.collisions.any()
     assert plant.collisions == {}
-    assert np.abs(named_contacts(plant)[1][:HANDS, 1]).min() > 1.0
+    assert np.abs(block.f_W[-1, :HANDS, 1]).min() > 1.0
