@@ -73,7 +73,7 @@ def pictures() -> dict[str, bytes]:
 
 
 def _python(*arguments: str) -> subprocess.CompletedProcess[str]:
-    environment = {**os.environ, "PYTHONPATH": str(_ROOT), "MUJOCO_GL": "egl"}
+    environment = {**os.environ, "PYTHONPATH": str(_ROOT / "src"), "MUJOCO_GL": "egl"}
     command = [sys.executable, *arguments]
     return subprocess.run(command, cwd=_ROOT, env=environment, capture_output=True, text=True)
 

@@ -1,5 +1,6 @@
 """Every snippet and command in README and docs does what it says."""
 
+import ast
 import contextlib
 import io
 import itertools
@@ -46,6 +47,8 @@ PARSED = {
     "fulcrum view": "opens a window",
     "fulcrum screenshot": "needs a Vulkan driver; tests/test_pictures.py draws where there is one",
     "fulcrum reproduce": "takes 10 s; tests/scenarios/test_reproduce.py",
+    "fulcrum crosscheck": "needs Drake; tests/sim/run/test_crosscheck.py",
+    "fulcrum run box-tilt --engine drake": "needs Drake; tests/sim/plant/test_drake.py",
     "fulcrum run crate.toml": "takes as long as the whole tilt that python.md runs",
 }
 # What ends with code 1, and why.
@@ -230,10 +233,101 @@ def test_sections_that_pages_take_from_readme_are_there():
         for path in PAGES
         for name in re.findall(r'--8<-- "README\.md:(\w+)"', path.read_text())
     ]
-    assert len(taken) > 5
+    assert set(taken) == set(re.findall(r"--8<-- \[start:(\w+)\]", readme))
+    assert len(taken) > 2
     for name in taken:
         assert readme.count(f"--8<-- [start:{name}]") == 1, name
         assert readme.count(f"--8<-- [end:{name}]") == 1, name
+
+
+# --- README: short, and what it shows is what a run prints ---
+
+MOST_LINES = 110
+
+
+def test_readme_is_short():
+    assert len((ROOT / "README.md").read_text().splitlines()) <= MOST_LINES
+
+
+def test_readme_links_to_files_that_are_there():
+    found = links((ROOT / "README.md").read_text())
+    assert len(found) > 8
+    assert [link for link in found if not (ROOT / link).is_file()] == []
+
+
+def links(text):
+    """Where the links and pictures of a page lead."""
+    tokens = [child for token in MarkdownIt().parse(text) for child in token.children or ()]
+    return [token.attrs.get("href") or token.attrs["src"] for token in tokens if token.attrs]
+
+
+def test_the_demo_prints_what_readme_shows(tmp_path):
+    # In the Makefile it is this command.
+    output = io.StringIO()
+    with contextlib.redirect_stdout(output):
+        assert main(["run", "box-tilt", "--out", str(tmp_path)]) == 0
+    shown = next(b.text for b in BLOCKS["README.md"] if b.text.startswith("box-tilt: PASS"))
+    assert printed_as_shown(shown, output.getvalue())
+    assert not printed_as_shown(shown.replace("0.021", "0.027"), output.getvalue())
+
+
+def printed_as_shown(shown, output):
+    """Whether an output has the lines that a page shows, but for time and place."""
+    asked, given = (
+        [re.sub(r"; [\d.]+ x real.*|Recording: .*", "", line).strip() for line in text.splitlines()]
+        for text in (shown, output)
+    )
+    asked, given = list(filter(None, asked)), list(filter(None, given))
+    # Long lines wrap.
+    return len(asked) > 8 and agrees(" ".join(asked), " ".join(given))
+
+
+# --- the house: where to find what ---
+
+HOUSE = ROOT / "docs" / "house.md"
+
+
+def answers(text):
+    """Rows of a table that answer with a file and a name in it."""
+    return re.findall(r"^\| [^|]+ \| `([\w/]+\.py)` \| `([\w.]+)` \|$", text, re.MULTILINE)
+
+
+def defined(source, name):
+    """Whether a module defines a class or function of that name, or a class's method."""
+    body = ast.parse(source).body
+    for part in name.split("."):
+        definitions = (ast.ClassDef, ast.FunctionDef)
+        found = [n for n in body if isinstance(n, definitions) and n.name == part]
+        if not found:
+            return False
+        body = found[0].body
+    return True
+
+
+def wrong_answers(text):
+    return [
+        (file, name)
+        for file, name in answers(text)
+        if not (ROOT / file).is_file() or not defined((ROOT / file).read_text(), name)
+    ]
+
+
+def test_the_house_says_where_to_find_what():
+    text = HOUSE.read_text()
+    table = text[text.index("## Where do I find") :].partition("\n\nA setting")[0]
+    rows = [line for line in table.splitlines() if line.startswith("| ")]
+    assert len(answers(table)) == len(rows) - 1 > 20  # all but the head
+    assert wrong_answers(table) == []
+
+
+def test_the_house_names_all_packages():
+    rows = re.findall(r"^\| `([a-z/]+)` \|", HOUSE.read_text(), re.MULTILINE)
+    packages = {"assets", "synthesis"} | {
+        path.parent.relative_to(ROOT).as_posix()
+        for top in ("synthesis", "sim", "scenarios")
+        for path in (ROOT / top).glob("*/__init__.py")
+    }
+    assert sorted(rows) == sorted(packages)
 
 
 # --- negative controls ---
@@ -286,3 +380,16 @@ def test_a_wrong_command_is_caught(line):
 )
 def test_numbers_may_differ_by_their_last_digit_and_words_may_not(expected, actual, same):
     assert agrees(expected, actual) is same
+
+
+@pytest.mark.parametrize(
+    "row",
+    [
+        "| slip | `sim/evaluation/watch.py` | `Monitor.update` |",
+        "| slip | `sim/evaluation/monitor.py` | `Watch` |",
+        "| slip | `sim/evaluation/monitor.py` | `Monitor.slip` |",
+    ],
+)
+def test_a_wrong_answer_is_caught(row):
+    assert len(wrong_answers(row)) == 1
+    assert wrong_answers("| slip | `sim/evaluation/monitor.py` | `Monitor.update` |") == []
