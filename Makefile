@@ -6,9 +6,10 @@ BIN := .venv/bin
 STAMP := .venv/.installed
 BENCH_STAMP := .venv/.installed-bench
 DOCS_STAMP := .venv/.installed-docs
+DRAKE_STAMP := .venv/.installed-drake
 OUT ?= logs/benchmark.json
 
-.PHONY: demo test bench docs lint type format assets clean
+.PHONY: demo test bench docs crosscheck lint type format assets clean
 
 demo: $(STAMP)
 	$(BIN)/fulcrum run box-tilt
@@ -24,6 +25,10 @@ bench: $(BENCH_STAMP)
 docs: $(DOCS_STAMP)
 	NO_MKDOCS_2_WARNING=1 $(BIN)/python -m mkdocs build
 	@echo "site/index.html"
+
+# The same run in MuJoCo and in Drake, and at half the step; fails where they disagree.
+crosscheck: $(DRAKE_STAMP)
+	$(BIN)/fulcrum crosscheck panda-box --controller margin
 
 lint: $(STAMP)
 	$(BIN)/ruff check .
@@ -51,6 +56,10 @@ $(STAMP): pyproject.toml constraints.txt
 
 $(BENCH_STAMP): $(STAMP)
 	$(BIN)/pip install --quiet --disable-pip-version-check -c constraints.txt -e ".[dev,bench]"
+	touch $@
+
+$(DRAKE_STAMP): $(STAMP)
+	$(BIN)/pip install --quiet --disable-pip-version-check -c constraints.txt -e ".[dev,drake]"
 	touch $@
 
 $(DOCS_STAMP): $(STAMP)

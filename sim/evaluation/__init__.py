@@ -1,5 +1,6 @@
 """What a run did and what it is worth: contact monitor, judge, report."""
 
+from fulcrum.sim.evaluation.checks import Checks
 from fulcrum.sim.evaluation.failure import Category
 from fulcrum.sim.evaluation.judge import Judge
 from fulcrum.sim.evaluation.monitor import ContactHistory, Monitor

@@ -27,8 +27,15 @@ def rms(values: Array) -> float:
 class Checks:
     """One set of checks for all runs; what differs between runs is how much is tolerated."""
 
-    def __init__(self, scenario: Scenario, joints: tuple[str, ...], tolerances: Judged) -> None:
+    def __init__(
+        self,
+        scenario: Scenario,
+        joints: tuple[str, ...],
+        tolerances: Judged,
+        coupled: tuple[tuple[int, ...], ...] = (),
+    ) -> None:
         self._scenario, self._joints, self._limits = scenario, joints, tolerances
+        self._coupled = coupled
         self._schedule = Schedule(scenario)
         self._shared = shared_places(scenario)
 
@@ -48,6 +55,8 @@ class Checks:
             found += self._contact(i, contact, trace, history, held)
         for place in self._shared:
             found += self._place(place, trace, history, held)
+        for hands in self._coupled:
+            found += self._together(hands, trace, history, held)
         found += self._hands(trace, history, free)
         found += self._tracking(tilt, trace)
         found += self._torques(trace)
@@ -63,6 +72,12 @@ class Checks:
         found += self._end(tilt, trace)
         return tuple(sorted(found, key=lambda failure: failure.t))
 
+    def lost(self, i: int, history: ContactHistory, held: Mask) -> Mask:
+        """Return the steps at which a contact counts as lost while it should hold, (k,)."""
+        limits, hand = self._limits, i < len(self._scenario.hands)
+        lost_s = limits.lost_s if hand else _given(limits.support_lost_s, limits.lost_s)
+        return self._stretches(held & ~history.kept[:, i], lost_s)
+
     def _contact(
         self,
         i: int,
@@ -73,12 +88,12 @@ class Checks:
     ) -> list[Failure]:
         limits, failures = self._limits, []
         name, hand = self._scenario.contact_names[i], i < len(self._scenario.hands)
-        off = held_rows & ~history.kept[:, i]
-        lost = off if hand else off & self._longer(off, limits.support_lost_s)
+        lost = self.lost(i, history, held_rows)
         # What a contact does once it has let go is no news.
         held = held_rows & ~np.logical_or.accumulate(lost)
         if lost.any():
-            count = f"{np.count_nonzero(off)} of {np.count_nonzero(held_rows)}"
+            off = np.count_nonzero(held_rows & ~history.kept[:, i])
+            count = f"{off} of {np.count_nonzero(held_rows)}"
             text = f"Contact {name} let go at {{when}}; it was lost in {count} steps."
             failures.append(_failure(trace, lost, Category.LOST, name, text))
         # Not "more than": what is no number is no success.
@@ -106,7 +121,7 @@ class Checks:
         if any(i in place for place in self._shared):
             return failures  # what is left is judged for the place as a whole
         used = held & (history.utilisation[:, i] > limits.utilisation)
-        if used.any():
+        if used.any() and not any(i in hands for hands in self._coupled):
             text = (
                 f"Contact {name} used {100 * contact.max_utilisation:.0f} % of its friction "
                 f"(allowed {100 * limits.utilisation:.0f} %), first at {{when}}."
@@ -115,7 +130,7 @@ class Checks:
         peak = float(np.abs(trace.w_commanded_C[:, i, N]).max())
         share = limits.force_error if hand else limits.support_force_error
         allowed = share * peak
-        if peak > 0.0 and not off.any() and contact.force_error_rms_n > allowed:
+        if peak > 0.0 and not lost.any() and contact.force_error_rms_n > allowed:
             text = (
                 f"Contact {name} followed its commanded normal force only to "
                 f"{contact.force_error_rms_n:.3g} N RMS (allowed {allowed:.3g} N)."
@@ -148,6 +163,25 @@ class Checks:
             f"(allowed {allowed:.3g} N)."
         )
         return [_failure(trace, held, Category.FORCE, names, text)]
+
+    def _together(
+        self, hands: tuple[int, ...], trace: Trace, history: ContactHistory, held: Mask
+    ) -> list[Failure]:
+        """The friction of hands that share a load as it happens to fall: what all of them use."""
+        chosen = np.array(hands)
+        mu = np.array([self._scenario.hands[i].friction.mu for i in hands])
+        can = mu * np.maximum(history.w_measured_C[:, chosen, N], 0.0)
+        does = np.where(can > 0.0, can * history.utilisation[:, chosen], 0.0)
+        share = does.sum(axis=1) / np.maximum(can.sum(axis=1), np.finfo(float).tiny)
+        used = held & history.kept[:, chosen].all(axis=1) & (share > self._limits.utilisation)
+        if not used.any():
+            return []
+        names = " and ".join(self._scenario.contact_names[i] for i in hands)
+        text = (
+            f"Contacts {names} together used {100 * share[used].max():.0f} % of their friction "
+            f"(allowed {100 * self._limits.utilisation:.0f} %), first at {{when}}."
+        )
+        return [_failure(trace, used, Category.FRICTION, names, text)]
 
     def _hands(self, trace: Trace, history: ContactHistory, free: Mask) -> list[Failure]:
         """Impacts while hands come and go, and hands that touch an object that stands alone."""
@@ -184,18 +218,24 @@ class Checks:
         return [_failure(trace, off, Category.TRACKING, "", text)]
 
     def _end(self, tilt: TiltReport, trace: Trace) -> list[Failure]:
-        limits = self._limits
-        if abs(tilt.final_deg - tilt.target_deg) <= limits.final_deg:
-            return []
-        text = (
-            f"The tilt ended at {tilt.final_deg:z.2f} deg instead of {tilt.target_deg:g} +- "
-            f"{limits.final_deg:g} deg."
-        )
-        return [Failure(float(trace.t[-1]), Category.TILT, "", text)]
+        limits, end = self._limits, float(trace.t[-1])
+        if not abs(tilt.final_deg - tilt.target_deg) <= limits.final_deg:
+            text = (
+                f"The tilt ended at {tilt.final_deg:z.2f} deg instead of {tilt.target_deg:g} +- "
+                f"{limits.final_deg:g} deg."
+            )
+            return [Failure(end, Category.TILT, "", text)]
+        if not tilt.final_mm <= limits.final_mm:
+            text = (
+                f"The object ended {tilt.final_mm:.3g} mm from its place "
+                f"(allowed {limits.final_mm:g} mm)."
+            )
+            return [Failure(end, Category.PLACE, "", text)]
+        return []
 
     def _torques(self, trace: Trace) -> list[Failure]:
         allowed = self._limits.saturated_s
-        long = np.array([self._longer(flags > 0.0, allowed) for flags in trace.saturated.T]).T
+        long = np.array([self._longer(flags, allowed) for flags in trace.saturated.T]).T
         cut = np.any(long, axis=1)
         if not cut.any():
             return []
@@ -209,7 +249,14 @@ class Checks:
         """Where a flag has been set at a stretch for longer than allowed [s]."""
         if math.isinf(allowed_s):
             return np.zeros(len(flags), bool)
-        return stretches(flags.astype(float)) > round(allowed_s / self._scenario.physics.timestep)
+        return stretches(flags) > round(allowed_s / self._scenario.physics.timestep)
+
+    def _stretches(self, flags: Mask, allowed_s: float) -> Mask:
+        """All of the stretches in which a flag has been set for longer than allowed [s]."""
+        if math.isinf(allowed_s):
+            return np.zeros(len(flags), bool)
+        length = stretches(flags) + stretches(flags[::-1])[::-1] - 1
+        return flags & (length > round(allowed_s / self._scenario.physics.timestep))
 
 
 def _given(value: float | None, default: float) -> float:

@@ -24,6 +24,7 @@ class Category(StrEnum):
     GIVEN_UP = "given-up"
     ERROR = "error"
     TILT = "tilt"
+    PLACE = "place"
     INTERRUPTED = "interrupted"
 
 

@@ -7,7 +7,7 @@ import numpy as np
 from fulcrum.sim.evaluation.checks import Checks, rms
 from fulcrum.sim.evaluation.failure import Category, Failure
 from fulcrum.sim.evaluation.monitor import ContactHistory
-from fulcrum.sim.evaluation.outcome import Outcome, measured_outcome
+from fulcrum.sim.evaluation.outcome import Outcome, distance_off, measured_outcome
 from fulcrum.sim.evaluation.report import (
     ContactReport,
     PhaseReport,
@@ -21,7 +21,7 @@ from fulcrum.sim.evaluation.report import (
 )
 from fulcrum.sim.motion import Schedule
 from fulcrum.sim.scenario import Scenario
-from fulcrum.sim.signals import Trace, torque_shares
+from fulcrum.sim.signals import Trace, stretches, torque_shares
 from fulcrum.synthesis.arrays import Array, Mask, N
 
 
@@ -35,6 +35,7 @@ class Judge:
         tau_min: Array,
         tau_max: Array,
         disturbed: bool = False,
+        coupled: tuple[tuple[int, ...], ...] = (),
     ) -> None:
         """Takes the plant's truth, joint names and torque limits, (l,).
 
@@ -45,12 +46,13 @@ class Judge:
             tau_max: Their largest torques [N·m or N], (l,).
             disturbed: Whether the world of the runs may differ from what is believed, so that the
                 scenario's tolerances for that count.
+            coupled: Hands that share a load across; see :func:`sim.model.coupling.coupled_hands`.
         """
         self._scenario, self._joints, self._disturbed = scenario, joints, disturbed
         self._tau_min, self._tau_max = tau_min, tau_max
         self._schedule = Schedule(scenario)
         tolerances = scenario.tolerances.disturbed if disturbed else scenario.tolerances
-        self._checks = Checks(scenario, joints, tolerances)
+        self._checks = Checks(scenario, joints, tolerances, coupled)
 
     def report(self, info: RunInfo, trace: Trace, history: ContactHistory) -> Report:
         """Return the report of a run of at least one step."""
@@ -59,7 +61,7 @@ class Judge:
         free = self._schedule.free[phase]
         tilt = self._tilt(trace)
         contacts = {
-            name: _contact(i, trace, history, held, free)
+            name: self._contact(i, trace, history, held, free)
             for i, name in enumerate(self._scenario.contact_names)
         }
         failures: tuple[Failure, ...]
@@ -92,6 +94,33 @@ class Judge:
             recording=info.recording,
         )
 
+    def _contact(
+        self, i: int, trace: Trace, history: ContactHistory, held: Mask, free: Mask
+    ) -> ContactReport:
+        impact = float(history.w_measured_C[free, i, N].max(initial=0.0))
+        if not held.any():
+            return ContactReport(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, impact, 0.0)
+        kept = history.kept[held, i]
+        holding = ~np.logical_or.accumulate(self._checks.lost(i, history, held))[held]
+        normal = history.w_measured_C[held, i, N]
+
+        def largest(quantity: Array) -> float:
+            return float(quantity[held, i][holding & kept].max(initial=0.0))
+
+        return ContactReport(
+            kept_fraction=float(kept.mean()),
+            slip_mm=1e3 * largest(history.slip),
+            slide_mm=1e3 * largest(history.slide),
+            spin_deg=float(np.degrees(largest(np.abs(history.spin)))),
+            max_utilisation=largest(history.utilisation),
+            max_normal_n=float(normal.max()),
+            force_error_rms_n=rms(normal - trace.w_commanded_C[held, i, N]),
+            free_normal_n=impact,
+            longest_gap_ms=1e3
+            * self._scenario.physics.timestep
+            * int(stretches(~kept).max(initial=0)),
+        )
+
     def _phases(self, trace: Trace) -> tuple[PhaseReport, ...]:
         names = [phase.name for phase in self._schedule.phases]
         begun = np.flatnonzero(np.diff(trace.phase, prepend=-1.0))
@@ -109,6 +138,7 @@ class Judge:
         return TiltReport(
             target_deg=target,
             final_deg=float(np.degrees(trace.tilt[-1])),
+            final_mm=1e3 * distance_off(self._scenario, trace, np.radians(target)),
             rms_error_deg=rms(error),
             max_error_deg=float(np.abs(error).max()),
         )
@@ -121,31 +151,6 @@ class Judge:
             joint=self._joints[worst],
             saturated_fraction=float(np.mean(np.any(trace.saturated, axis=1))),
         )
-
-
-def _contact(
-    i: int, trace: Trace, history: ContactHistory, held_rows: Mask, free: Mask
-) -> ContactReport:
-    impact = float(history.w_measured_C[free, i, N].max(initial=0.0))
-    if not held_rows.any():
-        return ContactReport(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, impact)
-    kept = history.kept[held_rows, i]
-    held = np.logical_and.accumulate(kept)
-    normal = history.w_measured_C[held_rows, i, N]
-
-    def largest(quantity: Array) -> float:
-        return float(quantity[held_rows, i][held].max(initial=0.0))
-
-    return ContactReport(
-        kept_fraction=float(kept.mean()),
-        slip_mm=1e3 * largest(history.slip),
-        slide_mm=1e3 * largest(history.slide),
-        spin_deg=float(np.degrees(largest(np.abs(history.spin)))),
-        max_utilisation=largest(history.utilisation),
-        max_normal_n=float(normal.max()),
-        force_error_rms_n=rms(normal - trace.w_commanded_C[held_rows, i, N]),
-        free_normal_n=impact,
-    )
 
 
 def _synthesis(trace: Trace) -> SynthesisReport:

@@ -76,7 +76,7 @@ def measured_outcome(scenario: Scenario, trace: Trace) -> Outcome:
     near = math.degrees(abs(tilt - target)) <= scenario.tolerances.disturbed.final_deg
     # Near the path's ends the measured tilt may lie beyond.
     on_path = target if near else min(max(tilt, 0.0), path.end)
-    if _distance(path, thing, trace, on_path) > _OFF * gyration(thing):
+    if distance_off(scenario, trace, on_path) > _OFF * gyration(thing):
         return Outcome.DROPPED
     return Outcome.COMPLETED if near else Outcome.RETURNED
 
@@ -118,9 +118,10 @@ def _speeds(thing: Object, quat_WO: Array, twist: Array) -> Array:
     return np.sqrt(np.sum(twist[:, :3] ** 2, axis=1) + turning)
 
 
-def _distance(path: ObjectPath, thing: Object, trace: Trace, tilt: float) -> float:
-    """How far the mass is off the path's pose at a tilt, at the end of a run [m]."""
-    R_WO, p_WO = path.pose(tilt)
+def distance_off(scenario: Scenario, trace: Trace, tilt: float) -> float:
+    """Return how far the mass is off the path's pose at a tilt [rad], at the end of a run [m]."""
+    thing = scenario.object
+    R_WO, p_WO = object_path(scenario.path).pose(tilt)
     (R_end,) = rotations(trace.quat_WO[-1:])
     center = np.asarray(thing.center_of_mass)
     off = trace.p_WO[-1] + R_end @ center - p_WO - R_WO @ center

@@ -53,10 +53,11 @@ class PhaseReport:
 
 @dataclass(frozen=True)
 class TiltReport:
-    """Target, final value and errors of the tilt [deg]."""
+    """Target, final value and errors of the tilt [deg]; how far off its place it ended [mm]."""
 
     target_deg: float
     final_deg: float
+    final_mm: float
     rms_error_deg: float
     max_error_deg: float
 
@@ -67,6 +68,7 @@ class ContactReport:
 
     Slip, slide, spin and utilisation count until it let go for the first time.
     ``free_normal_n`` is the largest normal force while no grip was asked for: a hand's impact.
+    ``longest_gap_ms`` is the longest stretch without a normal force.
     """
 
     kept_fraction: float
@@ -77,6 +79,7 @@ class ContactReport:
     max_normal_n: float
     force_error_rms_n: float
     free_normal_n: float
+    longest_gap_ms: float
 
     @property
     def kept_percent(self) -> float:
@@ -150,6 +153,7 @@ class Report:
             (
                 name,
                 f"{c.kept_percent:.1f}",
+                f"{c.longest_gap_ms:.0f}",
                 f"{c.slip_mm:.3f}",
                 f"{c.slide_mm:.3f}",
                 f"{c.spin_deg:.3f}",
@@ -158,7 +162,7 @@ class Report:
             )
             for name, c in self.contacts.items()
         ]
-        head = ("contact", "kept [%]", "slip [mm]", "slide [mm]", "spin [deg]")
+        head = ("contact", "kept [%]", "gap [ms]", "slip [mm]", "slide [mm]", "spin [deg]")
         judged = ", judged as a disturbed run" if self.disturbed else ""
         return page(
             Heading((f"{self.scenario}: ", self.verdict.shown)),

@@ -9,6 +9,7 @@ from fulcrum.sim.model.contacts import (
     shared_places,
     true_contacts,
 )
+from fulcrum.sim.model.coupling import coupled_hands
 from fulcrum.sim.model.grip import GripSchedule, pressed
 from fulcrum.sim.model.inertia import inertial_wrenches
 from fulcrum.sim.model.links import DETECTION, Names, distance, is_solid

@@ -15,6 +15,7 @@ from types import FrameType
 from typing import Any
 
 from fulcrum.sim.evaluation import ContactHistory, Judge, Monitor, Report, RunInfo
+from fulcrum.sim.model import coupled_hands
 from fulcrum.sim.planning import Planning
 from fulcrum.sim.plant import DivergedError, Engine
 from fulcrum.sim.recording import Recorder, open_viewer
@@ -143,8 +144,11 @@ def execute(
         engine=request.engine,
     )
     truth, robot = loop.truth, loop.robot
+    coupled = coupled_hands(request.scenario, robot)
     monitor, limits = Monitor(truth), (robot.tau_min, robot.tau_max)
-    judge = Judge(truth, robot.joints, *limits, disturbed=request.judged_as_disturbed)
+    judge = Judge(
+        truth, robot.joints, *limits, disturbed=request.judged_as_disturbed, coupled=coupled
+    )
     recorder = None
     histories: list[ContactHistory] = []
     error: str | None = None

@@ -57,15 +57,18 @@ class SweepResult:
                 f"{score.successes} of {score.episodes}",
                 f"{100.0 * score.rate:.1f} ({100.0 * score.low:.1f} to {100.0 * score.high:.1f})",
                 f"{score.grip_n:.1f}",
+                f"{100.0 * score.friction:.0f}",
+                f"{score.force_error_n:.2f}",
                 _named(score),
             )
             for score in self.scores
         ]
-        head = ("controller", "episodes", "success (95 %) [%]", "grip [N]", "failures began with")
+        head = ("controller", "episodes", "success (95 %) [%]", "grip [N]")
+        more = ("friction used [%]", "force error [N]", "failures began with")
         replays = [(s.controller, s.causes[0]) for s in self.scores if s.causes]
         return page(
             Marked("Sweep"),
-            table(head, rows),
+            table((*head, *more), rows),
             Lines(tuple(f"{name}, {first.cause}: {first.replay}" for name, first in replays)),
         )
 

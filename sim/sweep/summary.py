@@ -41,6 +41,9 @@ class Score:
         low, high: 95 % confidence interval of the rate (Clopper and Pearson 1934, exact) [-].
         grip_n: Median over the episodes of the largest normal force of a hand [N].
         grip_max_n: The largest of all [N].
+        friction: Median over the episodes of the largest share of its friction that a hand used
+            while it held [-]; at 1 it slides.
+        force_error_n: The same of the RMS error of a hand's normal force [N].
         causes: Of its failures, most frequent first.
     """
 
@@ -52,6 +55,8 @@ class Score:
     high: float
     grip_n: float
     grip_max_n: float
+    friction: float
+    force_error_n: float
     causes: tuple[FailureCause, ...]
 
 
@@ -71,11 +76,11 @@ def _score(name: str, rows: list[dict], hands: tuple[str, ...]) -> Score:
     successes = sum(row["success"] for row in rows)
     interval = binomtest(successes, len(rows)).proportion_ci(_CONFIDENCE, method="exact")
     # Episodes that ended in an error have no figures.
-    grips = [
-        max(row[f"contacts.{hand}.max_normal_n"] for hand in hands)
-        for row in rows
-        if row.get(f"contacts.{hands[0]}.max_normal_n") is not None
-    ]
+    done = [row for row in rows if row.get(f"contacts.{hands[0]}.max_normal_n") is not None]
+    grips, friction, errors = (
+        [max(row[f"contacts.{hand}.{figure}"] for hand in hands) for row in done] or [0.0]
+        for figure in ("max_normal_n", "max_utilisation", "force_error_rms_n")
+    )
     first: dict[str, str] = {}
     for row in rows:
         if row["cause"] is not None:
@@ -88,8 +93,10 @@ def _score(name: str, rows: list[dict], hands: tuple[str, ...]) -> Score:
         rate=successes / len(rows),
         low=float(interval.low),
         high=float(interval.high),
-        grip_n=float(np.median(grips)) if grips else 0.0,
-        grip_max_n=max(grips, default=0.0),
+        grip_n=float(np.median(grips)),
+        grip_max_n=max(grips),
+        friction=float(np.median(friction)),
+        force_error_n=float(np.median(errors)),
         causes=tuple(
             FailureCause(cause, n, n / len(rows), first[cause]) for cause, n in counts.most_common()
         ),

@@ -54,5 +54,10 @@ def changed(record, field, index, value):
     return replace(record, **{field: array})
 
 
+def gap(row):
+    """The rows of a gap that counts as a loss of contact: longer than 5 ms."""
+    return slice(row, row + 6)
+
+
 def when(trace, row):
     return f"{trace.t[row]:.2f} s (tilt {np.degrees(trace.tilt[row]):.1f} deg)"

@@ -25,6 +25,7 @@ from tests.helpers.short_run import (
     SCENARIO,
     TOUCH_ROW,
     changed,
+    gap,
     judge_of,
     short_run,
 )
@@ -64,7 +65,7 @@ def test_hands_may_slip_5_mm_and_supports_3_mm(contact, mm, found):
 
 
 def test_a_hand_must_not_let_go_while_it_holds_and_its_slip_after_that_is_no_news():
-    lost = changed(short_run().history, "kept", (ROW, LEFT), False)
+    lost = changed(short_run().history, "kept", (gap(ROW), LEFT), False)
     assert judged(history=lost) == [("lost left", ROW)]
     after = changed(lost, "slip", (slice(ROW, None), LEFT), 1.0)
     assert judged(history=after) == [("lost left", ROW)]
@@ -80,7 +81,7 @@ def test_a_support_may_let_go_but_what_it_slips_meanwhile_counts():
 
 def test_what_hands_do_before_full_grip_is_free():
     # Grip stands at 0.6 s.
-    early = changed(short_run().history, "kept", (GRIP_ROW, LEFT), False)
+    early = changed(short_run().history, "kept", (gap(GRIP_ROW), LEFT), False)
     assert judged(history=early) == []
 
 
@@ -130,7 +131,11 @@ NOT_JUDGED = {
         {"utilisation": 0.95},
         lambda: {"history": history("utilisation", LEFT, 1.5)},
     ),
-    "force left": ({"force_error": 0.02}, lambda: {"trace": commanded(1.1)}),
+    "force left": ({"force_error": 0.02}, lambda: {"trace": commanded(1.1, LEFT)}),
+    "force edge_left": (
+        {"support_force_error": 0.02},
+        lambda: {"trace": commanded(1.1, EDGE_LEFT)},
+    ),
     "lost edge_left": (
         {"support_lost_s": 0.0},
         lambda: {"history": history("kept", EDGE_LEFT, False)},
@@ -153,9 +158,9 @@ def history(field, contact, value):
     return changed(RUN().history, field, (slice(ROW, None), contact), value)
 
 
-def commanded(factor):
-    force = RUN().trace.w_commanded_C[:, LEFT, N]
-    return changed(RUN().trace, "w_commanded_C", np.s_[:, LEFT, N], factor * force)
+def commanded(factor, contact):
+    force = RUN().trace.w_commanded_C[:, contact, N]
+    return changed(RUN().trace, "w_commanded_C", np.s_[:, contact, N], factor * force)
 
 
 def hit(force):

@@ -21,6 +21,7 @@ from tests.helpers.short_run import (
     ROW,
     SCENARIO,
     changed,
+    gap,
     judge_of,
     short_run,
     when,
@@ -29,10 +30,10 @@ from tests.helpers.short_run import (
 REPORT_KEYS = {
     "": "scenario controller objective seed disturbed verdict outcome failures events phases tilt"
     " contacts torque synthesis timing recording",
-    "tilt": "target_deg final_deg rms_error_deg max_error_deg",
+    "tilt": "target_deg final_deg final_mm rms_error_deg max_error_deg",
     "contacts": "left right edge_left edge_right",
     "contacts.left": "kept_fraction slip_mm slide_mm spin_deg max_utilisation max_normal_n"
-    " force_error_rms_n free_normal_n",
+    " force_error_rms_n free_normal_n longest_gap_ms",
     "torque": "max_utilisation joint saturated_fraction",
     "synthesis": "solves failures p50_us p99_us",
     "timing": "sim_s wall_s real_time_factor",
@@ -56,7 +57,7 @@ def joint_index(name):
 # One tampering each: what is changed in (trace, history), and the sentence that must come of it.
 # Those that last to the end set all rows from ROW on.
 def let_go(trace, history):
-    return trace, changed(history, "kept", (ROW, EDGE_LEFT), False)
+    return trace, changed(history, "kept", (gap(ROW), EDGE_LEFT), False)
 
 
 def slipped(trace, history):
@@ -98,7 +99,7 @@ def followed_badly(trace, history):
 
 
 SENTENCES = {
-    let_go: "Contact edge_left let go at {when}; it was lost in 1 of 2100 steps.",
+    let_go: "Contact edge_left let go at {when}; it was lost in 6 of 2100 steps.",
     slipped: "Contact left slipped more than the allowed 0.1 mm at {when}; 0.2 mm in all.",
     slid: "Contact right slid more than the allowed 0.1 mm at {when}; 0.3 mm in all.",
     spun: "Contact left spun more than the allowed 0.1 deg at {when}.",
@@ -154,11 +155,11 @@ def test_a_slip_just_inside_its_tolerance_passes_and_just_outside_fails(judge, r
 
 
 def test_while_grip_is_built_up_contacts_are_not_held_to_account(judge, run):
-    history = changed(run.history, "kept", (GRIP_ROW, EDGE_LEFT), False)
+    history = changed(run.history, "kept", (gap(GRIP_ROW), EDGE_LEFT), False)
     history = changed(history, "utilisation", (GRIP_ROW, LEFT), 1.0)
     assert judge.report(INFO, run.trace, history).verdict is Verdict.PASS
     # The same at the first step after it is a failure.
-    history = changed(run.history, "kept", (600, EDGE_LEFT), False)
+    history = changed(run.history, "kept", (gap(600), EDGE_LEFT), False)
     assert judge.report(INFO, run.trace, history).verdict is Verdict.FAIL
 
 
@@ -171,7 +172,7 @@ def test_torques_are_held_to_account_while_grip_is_built_up(judge, run):
 def test_sentences_stand_in_the_order_of_time(judge, run):
     def told(slip_row, cut_row, loss_row):
         history = changed(run.history, "slip", (slice(slip_row, None), LEFT), 2e-4)
-        history = changed(history, "kept", (loss_row, RIGHT), False)
+        history = changed(history, "kept", (gap(loss_row), RIGHT), False)
         trace = changed(run.trace, "saturated", (cut_row, 0), 1.0)
         return [
             next(word for word in ("slipped", "cut", "let go") if word in sentence)

@@ -176,7 +176,7 @@ def test_a_plan_shows_duration_and_limits():
 
 def test_a_sweep_shows_rates_and_causes():
     cause = FailureCause("slip of left", 3, 0.3, "fulcrum run x")
-    score = Score("margin", 10, 7, 0.7, 0.348, 0.933, 34.1, 36.0, (cause,))
+    score = Score("margin", 10, 7, 0.7, 0.348, 0.933, 34.1, 36.0, 0.8, 0.2, (cause,))
     text = shown(SweepResult(pa.table({}), (score,)))
     found = cells(text)
     assert "70.0 (34.8 to 93.3)" in found
