@@ -23,7 +23,10 @@ COMMANDS = {
     "check": ("check box-tilt --out checked", "FEASIBLE"),
     "run": ("run mine.toml --controller margin --out run", "PASS"),
     "plan": ("plan box-tilt --out planned", "plan.json"),
-    "sweep": ("sweep mine.toml --episodes 1 --controllers margin --workers 1 --out many", "100.0"),
+    "sweep": (
+        "sweep mine.toml --episodes 1 --preset nominal --controllers margin --workers 1 --out many",
+        "100.0",
+    ),
     "place": (
         "place box-tilt --evaluations 8 --workers 1 --keep hands --reach 0.05",
         "goal largest-margin",

@@ -23,6 +23,9 @@ Choice = TypeVar("Choice", bound=StrEnum)
 
 PASSED, FAILED, BAD_INPUT, BUG, INTERRUPTED = 0, 1, 2, 70, 130
 
+# Where runs and sweeps without a folder of their own are kept.
+_LOGS = Path("logs")
+
 
 @dataclass(frozen=True)
 class Chosen:
@@ -209,7 +212,7 @@ def results_folder(out: Path | None, name: str) -> Path:
     from fulcrum.sim.run import check_new_folder, claim_folder
     from fulcrum.synthesis import InvalidInputError
 
-    folder = out or Path("logs") / f"{name}-{datetime.now():%Y%m%d-%H%M%S}"
+    folder = out or _LOGS / f"{name}-{datetime.now():%Y%m%d-%H%M%S}"
     try:
         if out is None:
             return claim_folder(folder)
@@ -223,9 +226,11 @@ def results_folder(out: Path | None, name: str) -> Path:
 
 @contextlib.contextmanager
 def removed_if_empty(folder: Path) -> Iterator[None]:
-    """Remove a folder in the end if nothing was written to it."""
+    """Remove a folder in the end if nothing was written to it; so is logs, if it is the last."""
     try:
         yield
     finally:
         with contextlib.suppress(OSError):  # it is gone, or holds something
             folder.rmdir()
+            if folder.parent == _LOGS:
+                _LOGS.rmdir()

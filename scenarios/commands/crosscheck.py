@@ -14,10 +14,10 @@ from fulcrum.scenarios.commands.common import (
     progress_bar,
     results_folder,
 )
+from fulcrum.scenarios.commands.terminal import show
+from fulcrum.synthesis.render import Bullets, Marked, Page, page, table
 
 if TYPE_CHECKING:
-    from rich.console import Console
-
     from fulcrum.sim.run import Crosscheck, Request
     from fulcrum.sim.world import World
 
@@ -46,8 +46,6 @@ class CrosscheckCommand(Chosen):
 
     def execute(self) -> int:
         """Do it; return the exit code."""
-        from rich.console import Console
-
         from fulcrum.sim.run import Request
         from fulcrum.sim.run.crosscheck import crosscheck
         from fulcrum.sim.run.crosscheck_picture import draw_crosscheck
@@ -61,44 +59,34 @@ class CrosscheckCommand(Chosen):
             return self._static(request)
         out = results_folder(self.out, f"crosscheck-{chosen.name}")
         out.mkdir(parents=True, exist_ok=True)
-        agrees, console = True, Console(highlight=False)
+        agrees = True
         with progress_bar(chosen.name) as move:
             checks = crosscheck(request, self._worlds(), progress=move)
             for i, check in enumerate(checks):
-                _print(console, check)
+                show(_page(check))
                 draw_crosscheck(f"{chosen.name}, {name}", check, out / f"crosscheck-{i}.png")
                 agrees &= check.agrees
-        console.print(f"figures: {out}", soft_wrap=True)
+        show(page(f"Figures: {out}"))
         return PASSED if agrees else FAILED
 
     def _static(self, request: Request) -> int:
-        from rich.box import SIMPLE
-        from rich.console import Console
-        from rich.markup import escape
-        from rich.table import Table
-
         from fulcrum.sim.analysis import static_differences
         from fulcrum.sim.run import Bounds
         from fulcrum.sim.run.execute import execute
 
         result = execute(request)
         found = static_differences(request.scenario, result.trace, result.history)
-        table = Table("contact", "normal", "normal", "tangential", "determined", box=SIMPLE)
-        table.add_row(*map(escape, ("", "[N]", "[% of peak]", "[N]", "[%]")), style="dim")
-        agrees = True
+        rows, agrees = [], True
         for name, off in found.items():
             share = off.normal_rms_n / off.peak_n if off.peak_n > 0.0 else 0.0
             agrees &= share <= Bounds().hand and off.solved == 1.0
-            table.add_row(
-                name,
-                f"{off.normal_rms_n:.4f}",
-                f"{100 * share:.3f}",
-                f"{off.tangential_rms_n:.4f}",
-                f"{100 * off.determined:.0f}",
+            figures = (off.normal_rms_n, 100 * share, off.tangential_rms_n)
+            rows.append(
+                (name, *(f"{x:.4f}" for x in figures), f"{100 * off.determined:.0f}"),
             )
-        console = Console(highlight=False)
-        console.print(f"{request.scenario.name}: hard contacts minus MuJoCo, RMS where determined")
-        console.print(table)
+        head = ("contact", "normal [N]", "normal [% of peak]", "tangential [N]", "determined [%]")
+        title = f"{request.scenario.name}: Pinocchio's hard contacts minus MuJoCo's, RMS"
+        show(page(title, table(head, rows)))
         return PASSED if agrees else FAILED
 
     def _worlds(self) -> dict[str, tuple[World, int]]:
@@ -118,31 +106,39 @@ class CrosscheckCommand(Chosen):
         return worlds
 
 
-def _print(console: Console, check: Crosscheck) -> None:
-    from rich.box import SIMPLE
-    from rich.markup import escape
-    from rich.table import Table
-
-    names = list(check.comparisons[0].contacts)
-    table = Table("", "verdict", "tilt", "error", "real time", box=SIMPLE, title=check.label)
-    for name in names:
-        table.add_column(f"{name}: normal, tangential, slip")
-    units = ["", "", "[deg]", "[deg]", "[x]", *("[% of peak], [N], [mm]" for _ in names)]
-    table.add_row(*map(escape, units), style="dim")
-    for comparison in check.comparisons:
-        report = comparison.result.report
-        table.add_row(
-            comparison.variant.name,
-            report.verdict,
-            f"{report.tilt.final_deg:z.3f}",
-            f"{report.tilt.max_error_deg:.3f}",
-            f"{report.timing.real_time_factor:.2f}",
-            *(
-                f"{100 * c.normal_share:.2f}, {c.tangential_rms_n:.2f}, {c.slip_mm:.3f}"
-                for c in comparison.contacts.values()
-            ),
+def _page(check: Crosscheck) -> Page:
+    """How the variants of one world went, and how each contact differs from the reference."""
+    runs = [
+        (
+            c.variant.name,
+            c.result.report.verdict,
+            c.result.report.outcome,
+            f"{c.result.report.tilt.final_deg:z.3f}",
+            f"{c.result.report.tilt.max_error_deg:.3f}",
+            f"{c.result.report.timing.real_time_factor:.2f}",
         )
-    console.print(table)
-    for comparison in check.comparisons:
-        for text in comparison.disagreements:
-            console.print(f"  {comparison.variant.name}: {text}")
+        for c in check.comparisons
+    ]
+    contacts = [
+        (
+            name,
+            c.variant.name,
+            f"{100 * d.normal_share:.2f}",
+            f"{d.tangential_rms_n:.2f}",
+            f"{d.slip_mm:.3f}",
+        )
+        for name in check.comparisons[0].contacts
+        for c in check.comparisons
+        for d in (c.contacts[name],)
+    ]
+    head = ("simulated by", "verdict", "outcome", "final tilt [deg]", "tilt error [deg]")
+    said = [f"{c.variant.name}: {text}" for c in check.comparisons for text in c.disagreements]
+    return page(
+        Marked(check.label),
+        table((*head, "x real time"), runs),
+        table(
+            ("contact", "simulated by", "normal [% of peak]", "tangential [N]", "slip [mm]"),
+            contacts,
+        ),
+        Bullets(tuple(said)),
+    )

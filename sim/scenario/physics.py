@@ -51,8 +51,9 @@ class Judged(Settings):
     error_deg: Limit = 0.2
     """Tilt error at any time [deg]."""
 
-    slip_mm: Limit = 0.1
-    """Drift of the points that touch [mm]."""
+    slip_mm: Limit = 0.2
+    """Drift of the points that touch [mm]. What is below 0.1 mm is numerical: at steps of 1 ms
+    contacts that stick creep by up to that in MuJoCo and in Drake, at half the step by half."""
 
     support_slip_mm: Limit | None = None
     """The same of supports [mm]; slip_mm, if it is left out."""

@@ -6,6 +6,7 @@ from dataclasses import replace
 import numpy as np
 
 from fulcrum.scenarios import scenario
+from fulcrum.sim.model.robot_model import RobotModel
 from fulcrum.sim.planning.execution import Planning, planned_tilt
 from fulcrum.sim.run.execute import Request, execute
 from fulcrum.sim.run.preparation import Preparation
@@ -19,13 +20,19 @@ def execution(name, stretch):
     return planned_tilt(scenario(name), Planning(stretch))
 
 
+def preparation(planned):
+    """What a run of an execution needs beside the control."""
+    robot = RobotModel(planned.scenario)
+    return Preparation(robot, planned.joint_path, planned.grip, planned)
+
+
 @functools.cache
 def executed(name, stretch, world=NO_DEVIATION, **changes):
     """A run of a planned tilt by the controller for it, with changes of its settings."""
     s = scenario(name)
     control = replace(controllers(s.control)["dynamic"], **changes)
     request = Request(s, "dynamic", control, world=world, planning=Planning(stretch))
-    return execute(request, prepared=Preparation.of(execution(name, stretch)))
+    return execute(request, prepared=preparation(execution(name, stretch)))
 
 
 @functools.cache
@@ -34,7 +41,7 @@ def executed_as(name, planning, world=NO_DEVIATION):
     s = scenario(name)
     control = controllers(s.control)["dynamic"]
     request = Request(s, "dynamic", control, world=world, planning=planning)
-    return execute(request, prepared=Preparation.of(planned_tilt(s, planning)))
+    return execute(request, prepared=preparation(planned_tilt(s, planning)))
 
 
 def longest(flags):

@@ -175,7 +175,10 @@ def test_cylinder_s_conflict_is_in_world_axes_and_about_the_centre_of_mass(turn_
     first, second = words
     # Two solves of one problem in different frames, with 1697 N where 30 N weigh.
     assert first.balances == pytest.approx(second.balances, abs=1e-3)
-    assert first.limits == pytest.approx(second.limits, abs=1e-3)
+    # One frame's noise may be named, from a share of 1e-4 on (measured 1.6e-4), the other's not.
+    for name in {*first.limits, *second.limits}:
+        assert first.limits.get(name, 0.0) == pytest.approx(second.limits.get(name, 0.0), abs=1e-3)
+    assert first.bearable == pytest.approx(second.bearable, rel=1e-4)
     assert "moment balance about world y" in first.balances
     assert {"grip limit of outer", "grip limit of inner"} & set(first.limits)
 

@@ -92,29 +92,44 @@ def test_softer_contacts_carry_the_same_force_at_every_step(name):
     assert np.abs(shift[rows & ~landing(name, default.trace)[: len(rows)]]).max() < SAME_FORCE
 
 
-def role_shift(name, case):
+# By so many steps may it differ when a face comes down. Measured: 3 (box-tilt), 5 (box-wall).
+LATER = 6
+
+
+def role_shift(name, case, later=0):
     """Largest difference of forces by role from the default, over their peaks, (2,).
 
     When the far side of a face comes down, the edge hands over part of its load within a step.
-    Which step that is differs by one: each force is compared with the nearest of three steps.
+    Which step that is hangs on 1e-4 deg: while an object comes down, and only then, each force is
+    compared with the nearest of some steps before and after.
     """
     both = [by_role(name, run(name, which)) for which in ("default", case)]
     steps = min(map(len, both))
     default, other = (forces[:steps] for forces in both)
-    near = np.stack([np.roll(other, lag, axis=0) for lag in (-1, 0, 1)])
-    rows = settled(name, run(name, "default").trace)[:steps]
-    return np.abs(near - default).min(axis=0)[rows].max(axis=0) / default[rows].max(axis=0)
+    trace = run(name, "default").trace
+    rows, lands = settled(name, trace)[:steps], landing(name, trace)[:steps, None]
+    near = np.stack([np.roll(other, lag, axis=0) for lag in range(-later, later + 1)])
+    off = np.where(lands, np.abs(near - default).min(axis=0), np.abs(other - default))
+    return off[rows].max(axis=0) / default[rows].max(axis=0)
 
 
 @pytest.mark.parametrize("name", NAMES)
 def test_contacts_without_noslip_carry_the_same_force_by_role_at_every_step(name):
     # How neighbouring points of a rigid edge share their load is left to a slow roll of the object
     # that hardly any force resists: single points differ by 3.5 % (box), their sum by 0.12 %.
-    assert role_shift(name, "without noslip").max() < SAME_FORCE
+    # Measured 0.02 % until the object comes down (box-wall), then RMSMARK.
+    assert role_shift(name, "without noslip", LATER).max() < SAME_FORCE
+
+
+def test_a_foot_moves_along_the_floor_as_far_as_the_wall_gives():
+    """So that it is no sliding: half the stiffness doubles it (measured 0.051 and 0.101 mm)."""
+    moved, further = (run("box-wall", case).report.contacts for case in ("default", "softer"))
+    for foot in ("foot_left", "foot_right"):
+        assert further[foot].slip_mm == pytest.approx(2.0 * moved[foot].slip_mm, rel=0.03)
 
 
 def test_a_slippery_truth_is_no_such_small_change_of_forces():
     shift, rows = force_shift(BOX, run(BOX, "default"), run(BOX, "slippery"))
     assert np.sqrt(np.mean(shift**2, axis=0)).max() > SAME_FORCE
     assert np.abs(shift[rows]).max() > SAME_FORCE
-    assert role_shift(BOX, "slippery").max() > SAME_FORCE
+    assert role_shift(BOX, "slippery", LATER).max() > SAME_FORCE

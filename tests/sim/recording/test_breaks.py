@@ -133,8 +133,10 @@ def test_ctrl_c_leaves_a_whole_recording_and_a_report_that_says_interrupted(tmp_
     assert errors == ""
     report = json.loads((tmp_path / "report.json").read_text())
     assert report["verdict"] == "interrupted"
-    (sentence,) = report["failures"]
-    assert sentence.startswith("The run was interrupted at ")
+    assert report["outcome"] == "interrupted"
+    (failure,) = report["failures"]
+    assert failure["category"] == "interrupted"
+    assert failure["text"].startswith("The run was interrupted at ")
     assert verified(recording)
     content = Content(recording)
     begun = [phase["name"] for phase in report["phases"]]

@@ -8,6 +8,8 @@ import pytest
 
 from fulcrum.scenarios import scenario
 from fulcrum.scenarios.cli import main
+from fulcrum.sim.evaluation.failure import Category, Failure
+from fulcrum.sim.evaluation.outcome import Outcome
 from fulcrum.sim.evaluation.report import Verdict
 from fulcrum.sim.motion.schedule import Schedule
 from fulcrum.sim.plant import engines
@@ -47,7 +49,7 @@ def changed(result, normal=1.0, **report):
     """The result with the hands' normal forces scaled, and another report."""
     wrenches = result.history.w_measured_C.copy()
     wrenches[:, :2, 2] *= normal
-    history = replace(result.history, w_OC_C=wrenches)
+    history = replace(result.history, w_measured_C=wrenches)
     return replace(result, report=replace(result.report, **report), history=history)
 
 
@@ -71,7 +73,7 @@ def test_hands_agree_within_2_percent_of_their_peak(result, factor, agrees):
 def test_tilts_and_verdicts_that_differ_are_told(result):
     tilt = replace(result.report.tilt, final_deg=result.report.tilt.final_deg + 0.2)
     other = Verdict.FAIL if result.report.verdict is Verdict.PASS else Verdict.PASS
-    failures = ("Contact left slipped more than the allowed 0.1 mm at 3.00 s; 4 mm in all.",)
+    failures = (Failure(3.0, Category.SLIP, "left", "Contact left slipped."),)
     found = compare(
         DRAKE, changed(result, tilt=tilt, verdict=other, failures=failures), result, SHORT, Bounds()
     )
@@ -81,15 +83,23 @@ def test_tilts_and_verdicts_that_differ_are_told(result):
 
 
 def test_two_failures_agree_if_they_have_a_cause_in_common(result):
-    slipped = ("Contact left slipped more than the allowed 0.1 mm at 3.38 s; 41 mm in all.",)
-    later = ("Contact right slipped more than the allowed 0.1 mm at 3.36 s; 40 mm in all.",)
-    fell = ("The tilt ended at 0.00 deg instead of 90 +- 0.1 deg.",)
-    assert causes(slipped) == causes(later) == {"slipped"}
     first, second, third = (
-        changed(result, verdict=Verdict.FAIL, failures=f) for f in (slipped, later, fell)
+        changed(result, verdict=Verdict.FAIL, failures=(failure,))
+        for failure in (
+            Failure(3.38, Category.SLIP, "left", "Contact left slipped."),
+            Failure(3.36, Category.SLIP, "right", "Contact right slipped."),
+            Failure(9.0, Category.TILT, "", "The tilt ended at 0.00 deg."),
+        )
     )
+    assert causes(first.report) == causes(second.report) == {Category.SLIP}
     assert compare(DRAKE, second, first, SHORT, Bounds()).disagreements == ()
     assert "fails otherwise" in compare(DRAKE, third, first, SHORT, Bounds()).disagreements[0]
+
+
+def test_outcomes_that_differ_are_told(result):
+    dropped = changed(result, outcome=Outcome.DROPPED)
+    (text,) = compare(DRAKE, dropped, result, SHORT, Bounds()).disagreements
+    assert text == f"outcome dropped instead of {result.report.outcome}"
 
 
 def test_half_the_step_gives_rows_at_the_scenarios_own(request_, result):
