@@ -38,6 +38,8 @@ SMALLER = {
         'fulcrum.sweep(SHORT, 1, ("robust", "margin"), preset="lab", '
         'workers=Workers(scheduler="{scheduler}"),'
     ),
+    "place mine.toml": "place mine.toml --evaluations 60 --seconds 60",
+    "place crate.toml": "place crate.toml --evaluations 60 --seconds 60",
     "[--stretch 1.5]": "--stretch 1.5",  # so short a tilt in least time is all acceleration
     "--tilt-deg 30": "--tilt-deg 8",
     "robust 20\nmargin 20": "robust 1\nmargin 1",
