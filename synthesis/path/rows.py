@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
 
 import clarabel
 import numpy as np
@@ -12,33 +11,16 @@ import scipy.sparse as sp
 from fulcrum.synthesis.arrays import Array, Indices
 
 
-@dataclass(frozen=True, eq=False)
-class Group:
-    """Rows of constraints of the same kinds at several places.
-
-    Attributes:
-        rows: Row numbers, (places, r).
-        s: Places on the path, (places,); NaN for a constraint on the whole path.
-        names: Names of the r rows at each place, or once for all places; empty for rows that are
-            not limits.
-    """
-
-    rows: Indices
-    s: Array
-    names: list[list[str]]
-
-
 class Rows:
     r"""Data of :math:`Ax + s = h,\ s \in \mathcal{K}`: equalities, inequalities, cones, in order.
 
     Attributes:
         cones: Clarabel's cones.
-        groups: Names and places of the rows.
     """
 
     def __init__(self) -> None:
         self.cones: list[clarabel.ZeroConeT] = []
-        self.groups: list[Group] = []
+        self._named: list[tuple[Indices, Array, tuple[list[str], ...]]] = []
         self._entries: list[tuple[Array, Indices, Indices]] = []
         self._h: list[Array] = []
         self._shifts: list[tuple[Indices, Array]] = []
@@ -47,11 +29,18 @@ class Rows:
         self._second_order: list[Indices] = []
 
     def new(self, h: Array, s: Array, *names: list[str]) -> Indices:
-        """Return new row numbers for right-hand sides h, (places, r), at places s, (places,)."""
+        """Return new row numbers, (places, r).
+
+        Args:
+            h: Right-hand sides, (places, r).
+            s: Places on the path, (places,); NaN for a constraint on the whole path.
+            names: Names of the r rows at each place, or once for all places; "" for rows that are
+                not limits.
+        """
         rows = self._count + np.arange(h.size).reshape(h.shape)
         self._count += h.size
         self._h.append(h.ravel())
-        self.groups.append(Group(rows, s, list(names)))
+        self._named.append((rows, s, names))
         return rows
 
     def add(self, data: Array | float, rows: Indices, columns: Indices) -> None:
@@ -103,9 +92,8 @@ class Rows:
 
     def weights(self, z: Array) -> Iterator[tuple[float, float, str]]:
         """Yield the size of the multiplier of each limit, its place and its name."""
-        for group in self.groups:
-            for k, (rows, s) in enumerate(zip(group.rows, group.s, strict=True)):
-                names = group.names[k if len(group.names) > 1 else 0]
-                for row, name in zip(rows, names, strict=True):
+        for rows, places, names in self._named:
+            for k, s in enumerate(places):
+                for row, name in zip(rows[k], names[k if len(names) > 1 else 0], strict=True):
                     if name:
                         yield abs(float(z[row])), float(s), name
