@@ -10,7 +10,7 @@ import pytest
 
 from fulcrum.scenarios import scenario
 from fulcrum.scenarios.cli import main
-from fulcrum.scenarios.requests import chosen_planning
+from fulcrum.scenarios.functions import chosen_planning
 from fulcrum.sim.planning.execution import Planning, planned_tilt
 from fulcrum.sim.scenario.phases import Phase
 from fulcrum.sim.sweep.design import Sweep
