@@ -15,17 +15,17 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Geom:
-    """A primitive in MuJoCo's terms, or a mesh, which touches as its convex hull does.
+    """A primitive shape of MuJoCo, or a mesh, whose contacts are those of its convex hull.
 
     Attributes:
-        name: Unique in the scene.
+        name: Name, unique in the scene.
         kind: Geom type as MuJoCo names it: plane, sphere, capsule, ellipsoid, cylinder, box, mesh.
-        size: Sizes as MuJoCo reads them (half extents; radius, half length) [m]; of a mesh its
-            scale, as one number or one along each axis.
+        size: Sizes as MuJoCo reads them (half extents; radius, half length) [m]; for a mesh its
+            scale: one number, or one along each axis.
         pose: Pose in the frame of the owner (object or world).
         rgba: Colour and opacity, each 0 to 1; geoms of opacity 0 are not drawn.
-        solid: Whether the robot must keep clear of it (but for tips where they hold the object).
-        file: Of a mesh; None for all others.
+        solid: Whether the robot must keep clear of it, except for tips at their contacts.
+        file: Path of the mesh file; None for all other kinds.
     """
 
     name: str

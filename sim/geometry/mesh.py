@@ -1,4 +1,4 @@
-"""Mesh files of objects: read, checked, and what is where on their surface and their hull."""
+"""Meshes of objects: reading and checking of files, queries on surface and convex hull."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from fulcrum.synthesis.arrays import Array
 
 # Formats that refer to no other file.
 _FORMATS = (".obj", ".ply", ".stl")
-# How many meshes are kept in memory, with all that has been worked out about them.
+# How many meshes are kept in memory.
 _KEPT = 32
 
 
@@ -25,14 +25,14 @@ class Mesh:
     """A closed surface in the frame of its file.
 
     Attributes:
-        vertices: [m], (v, 3).
-        faces: Indices of the vertices, counter-clockwise as seen from outside, (f, 3).
-        normals: Out of the faces, (f, 3).
-        volume: [m^3].
-        center: Centre of mass, if homogeneous [m], (3,).
-        moments: Principal moments about it per mass [m^2], (3,).
-        axes: Principal axes as the columns of a rotation, (3, 3).
-        hull: Planes of the convex hull: normals and offsets, n p <= d inside, (h, 4).
+        vertices: Positions of the vertices [m], (v, 3).
+        faces: Indices of each face's vertices, (f, 3), counter-clockwise as seen from outside.
+        normals: Outward unit normals of the faces, (f, 3).
+        volume: Enclosed volume [m^3].
+        center: Centre of mass for uniform density [m], (3,).
+        moments: Principal moments of inertia about the centre, per mass [m^2], (3,).
+        axes: Principal axes as columns of a rotation matrix, (3, 3).
+        hull: Planes of the convex hull as normals n and offsets d, (h, 4); n p <= d inside.
     """
 
     vertices: Array
@@ -45,19 +45,19 @@ class Mesh:
     hull: Array
 
     def closest(self, p: Array) -> tuple[Array, Array]:
-        """The surface point closest to a point, (3,) each, and the normal out of it."""
+        """Return the surface point closest to a point, and its outward normal, (3,) each."""
         import trimesh
 
         triangles = self.vertices[self.faces]
         points = trimesh.triangles.closest_point(triangles, np.broadcast_to(p, (len(triangles), 3)))
         distances = np.linalg.norm(points - p, axis=1)
         near = np.flatnonzero(distances <= distances.min() + 1e-12)
-        # Of the faces that meet in an edge or corner the one that looks most towards the point.
+        # At an edge or corner take the face whose normal points most towards p.
         face = near[np.argmax(self.normals[near] @ (p - points[near[0]]))]
         return points[face], self.normals[face]
 
     def outermost(self, direction: Array) -> tuple[Array, Array]:
-        """The last surface point on a ray from the centre, (3,), and the normal out of it.
+        """Return the last surface point on a ray from the centre and its outward normal, (3,) each.
 
         Source: Moeller and Trumbore 1997, for all triangles at once.
         """
@@ -70,7 +70,7 @@ class Mesh:
             turned = np.cross(arm, edge_1)
             v = turned @ direction / det
             far = np.einsum("fi,fi->f", edge_2, turned) / det
-            # An edge or corner must not slip through between its triangles.
+            # Tolerance, so that a ray through an edge or corner hits one of its triangles.
             hit = (u >= -1e-9) & (v >= -1e-9) & (u + v <= 1.0 + 1e-9) & (far > 0.0)
         if not hit.any():  # the centre of a mesh need not be inside it
             return self.closest(self.center + direction * np.ptp(self.vertices))
@@ -78,16 +78,16 @@ class Mesh:
         return self.center + far[face] * direction, self.normals[face]
 
     def inside_hull(self, p: Array) -> float:
-        """How far inside the convex hull a point is [m]; negative outside."""
+        """Return the depth of a point inside the convex hull [m]; negative outside."""
         return float((self.hull[:, 3] - self.hull[:, :3] @ p).min())
 
 
 def read_mesh(field: str, file: str, scale: tuple[float, ...]) -> Mesh:
-    """The mesh of a file, scaled by one factor, or by one along each axis.
+    """Return the mesh of a file, scaled by one factor, or by one along each axis.
 
     Raises:
-        InvalidInputError: It is missing or unreadable, or no closed surface seen from outside;
-            named by the field.
+        InvalidInputError: The file is missing or unreadable, or is no closed surface with outward
+            faces; names the field.
     """
     path = Path(file)
     if path.suffix.lower() not in _FORMATS:
@@ -102,13 +102,13 @@ def read_mesh(field: str, file: str, scale: tuple[float, ...]) -> Mesh:
 
 @lru_cache(_KEPT)
 def _mesh(field: str, file: str, scale: tuple[float, ...], data: bytes) -> Mesh:
-    import trimesh  # takes a third of a second, and most objects have no mesh
+    import trimesh  # slow (a third of a second), and most objects have no mesh
 
     if not data.strip():
         raise InvalidInputError(field, f"{file}, which is empty", "a mesh file with faces")
     try:
         read: Any = trimesh.load_mesh(io.BytesIO(data), file_type=Path(file).suffix[1:].lower())
-    except Exception as error:  # readers of foreign files raise whatever comes to them
+    except Exception as error:  # trimesh's readers raise errors of many types
         given = f"{file}, which cannot be read ({type(error).__name__})"
         raise InvalidInputError(field, given, "a mesh file with faces") from None
     if not isinstance(read, trimesh.Trimesh) or not len(read.faces):

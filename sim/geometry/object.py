@@ -1,4 +1,4 @@
-"""The object that is moved: mass, inertia and what it is made of."""
+"""The object that is tilted: mass, inertia and geoms."""
 
 from __future__ import annotations
 
@@ -21,16 +21,16 @@ GRAVITY = 9.81  # [m/s^2]
 
 @dataclass(frozen=True)
 class Object:
-    """The thing that is tilted.
+    """The object that is tilted.
 
     Attributes:
-        name: What people call it.
-        mass: [kg].
+        name: Name for messages and pages.
+        mass: Mass [kg].
         inertia: Principal moments about the centre of mass [kg m^2].
-        center_of_mass: In the object frame [m].
-        geoms: What it is made of; contacts refer to these by name.
+        center_of_mass: Centre of mass in the object frame [m].
+        geoms: Geoms of the object; contacts refer to them by name.
         principal_axes: Orientation of the principal axes in the object frame, wxyz.
-        shape: What its geoms stand for, if it is a shape of :mod:`sim.geometry.shapes`.
+        shape: Shape that its geoms stand for, if it is one of :mod:`sim.geometry.shapes`.
     """
 
     name: str
@@ -59,14 +59,14 @@ class Object:
         return R_OI @ np.diag(self.inertia) @ R_OI.T
 
     def weighing(self, factor: float) -> Object:
-        """The object with so many times the mass, and inertia in proportion."""
+        """Return a copy with mass and inertia multiplied by `factor`."""
         x, y, z = self.inertia
         inertia = (factor * x, factor * y, factor * z)
         return replace(self, mass=factor * self.mass, inertia=inertia)
 
 
 def homogeneous(name: str, shape: Shape, mass: float, rgba: Color = COLOR) -> Object:
-    """An object of a shape and a mass [kg], the same all through."""
+    """Return an object of uniform density from a shape and a mass [kg]."""
     positive(f"{name}.mass", mass)
     return Object(
         name=name,

@@ -1,4 +1,4 @@
-"""Where a frame is in its parent frame."""
+"""Pose of a frame in its parent frame."""
 
 from __future__ import annotations
 
@@ -25,31 +25,31 @@ class Pose:
     def __post_init__(self) -> None:
         vector("pose.position", self.position, 3)
         vector("pose.quaternion", self.quaternion, 4)
-        # They are normalised where they are used, if their squares are numbers.
+        # Users of a quaternion normalise it; its squared length must be a finite number.
         if not 1e-3 < math.hypot(*self.quaternion) < 1e3:
             raise InvalidInputError("pose.quaternion", self.quaternion, "a quaternion of length 1")
 
     @property
     def rotation(self) -> Rotation:
-        """The orientation."""
+        """Orientation in the parent frame."""
         return Rotation.from_quat(self.quaternion, scalar_first=True)
 
     def in_parent(self, p: Vector | Array) -> Array:
-        """A point of the frame [m], (3,), in the parent frame."""
+        """Return a point p of the frame [m], (3,), in the parent frame."""
         return np.asarray(self.position) + self.rotation.apply(p)
 
     def in_frame(self, p: Vector | Array) -> Array:
-        """A point of the parent frame [m], (3,), in the frame."""
+        """Return a point p of the parent frame [m], (3,), in the frame."""
         return self.rotation.inv().apply(p - np.asarray(self.position))
 
 
 def triple(values: Array) -> Vector:
-    """The numbers of an array, (3,)."""
+    """Return the numbers of an array, (3,), as a tuple."""
     x, y, z = values.tolist()
     return (x, y, z)
 
 
 def wxyz(rotation: Rotation) -> Quaternion:
-    """The quaternion of a rotation."""
+    """Return the quaternion (w, x, y, z) of a rotation."""
     w, x, y, z = rotation.as_quat(scalar_first=True).tolist()
     return (w, x, y, z)

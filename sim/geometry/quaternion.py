@@ -1,7 +1,7 @@
-"""Quaternions wxyz, one at a time: what controller and sensors do with them at every tick.
+"""Operations on single quaternions wxyz, for controller and sensors at every tick.
 
-Plain Python is several times faster here than a rotation of SciPy; arithmetic as in MuJoCo's
-engine. For many at once there is :class:`scipy.spatial.transform.Rotation`.
+Plain Python is several times faster here than SciPy; the arithmetic is that of MuJoCo's engine.
+For many quaternions at once use :class:`scipy.spatial.transform.Rotation`.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ import numpy as np
 
 from fulcrum.synthesis.arrays import Array
 
-# Lengths this near to 1 are 1, and this near to 0 are 0.
+# Lengths within this distance of 1 count as 1, and below it as 0.
 _ROUNDING = 1e-15
 
 
@@ -45,12 +45,12 @@ def product(p: Array, q: Array) -> Array:
 
 
 def inverse(q: Array) -> Array:
-    """Return the rotation back, (4,)."""
+    """Return the inverse of a unit quaternion, (4,)."""
     return q * (1.0, -1.0, -1.0, -1.0)
 
 
 def normalized(q: Array) -> Array:
-    """Return a quaternion of the same direction and length 1, (4,); no turn if it has none."""
+    """Return the quaternion scaled to length 1, (4,); the identity if its length is 0."""
     w, x, y, z = q.tolist()
     length = math.sqrt(w * w + x * x + y * y + z * z)
     if length < _ROUNDING:
@@ -73,14 +73,14 @@ def rotated(q: Array, vector: Array) -> Array:
 
 
 def about(axis: Array, angle: float) -> Array:
-    """Return the turn by an angle [rad] about an axis of length 1, (3,)."""
+    """Return the quaternion, (4,), of a turn by an angle [rad] about a unit axis, (3,)."""
     x, y, z = axis.tolist()
     sine = math.sin(0.5 * angle)
     return np.array([math.cos(0.5 * angle), x * sine, y * sine, z * sine])
 
 
 def difference(p: Array, q: Array) -> Array:
-    """Return the rotation vector [rad], (3,), in q's own axes, that turns q into p, (4,) each."""
+    """Return the rotation vector [rad], (3,), in q's axes, that turns q into p, (4,) each."""
     turn = product(inverse(q), p)
     sine, axis = _direction(turn[1:])
     angle = 2.0 * math.atan2(sine, turn[0])
@@ -88,13 +88,13 @@ def difference(p: Array, q: Array) -> Array:
 
 
 def turned(q: Array, rotvec: Array, share: float = 1.0) -> Array:
-    """Return a quaternion, (4,), turned by a share of a rotation vector [rad] in its own axes."""
+    """Return q, (4,), turned by `share` of a rotation vector [rad], (3,), in q's axes."""
     angle, axis = _direction(rotvec)
     return product(normalized(q), about(axis, share * angle))
 
 
 def _direction(vector: Array) -> tuple[float, Array]:
-    """The length of a vector, (3,), and its direction, of length 1; zero for none."""
+    """Return the length and the unit direction, (3,), of a vector; zeros for a zero vector."""
     x, y, z = vector.tolist()
     length = math.sqrt(x * x + y * y + z * z)
     return length, vector * (1.0 / length) if length > 0.0 else np.zeros(3)

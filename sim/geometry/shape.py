@@ -1,4 +1,4 @@
-"""What a shape is: its faces, volume and inertia, its geoms, and where on it a contact may be."""
+"""Base class of shapes: faces, volume, inertia, geoms, and places for contacts."""
 
 from __future__ import annotations
 
@@ -25,8 +25,8 @@ class Place(NamedTuple):
     """A point of a surface.
 
     Attributes:
-        point: In the object frame [m].
-        normal: Into the object, in its axes.
+        point: The point in the object frame [m].
+        normal: Inward normal in the object's axes.
         face: Name of the face.
     """
 
@@ -36,14 +36,14 @@ class Place(NamedTuple):
 
 
 class Shape(Settings, ABC):
-    """A shape in the object's frame, whose origin is its middle (of a mesh: that of its file).
+    """A shape in the object's frame; the origin is its middle (for a mesh: that of its file).
 
-    Its faces have names; a place on a face is said by two coordinates u and v in [0, 1].
+    Its faces have names; a place on a face is given by two coordinates u and v in [0, 1].
     """
 
     @property
     def label(self) -> str:
-        """What errors call the shape."""
+        """Name of the shape in error messages."""
         return "shape"
 
     @property
@@ -54,11 +54,11 @@ class Shape(Settings, ABC):
     @property
     @abstractmethod
     def volume(self) -> float:
-        """[m^3]."""
+        """Volume [m^3]."""
 
     @property
     def center(self) -> Vector:
-        """Centre of mass, if homogeneous, in the object frame [m]."""
+        """Centre of mass in the object frame for uniform density [m]."""
         return (0.0, 0.0, 0.0)
 
     @property
@@ -68,32 +68,32 @@ class Shape(Settings, ABC):
 
     @abstractmethod
     def inertia(self, mass: float) -> Vector:
-        """Principal moments about the centre of mass, if homogeneous [kg m^2]."""
+        """Return the principal moments [kg m^2] about the centre of mass for uniform density."""
 
     @abstractmethod
     def geoms(self, name: str, rgba: Color = COLOR) -> tuple[Geom, ...]:
-        """What it is made of; a geom that stands alone has the given name."""
+        """Return the geoms of the shape; a single geom has the given name."""
 
     def touched(self, name: str, p_O: Vector) -> str:
-        """Name of that of its :meth:`geoms` which a hand touches at a place."""
+        """Return the name of the geom of :meth:`geoms` that a hand at p_O [m] touches."""
         return name
 
     @property
     def resting(self) -> str | None:
-        """Name of the geom that touches the environment, if it is not the one that hands touch."""
+        """Name of the geom that touches the environment; None if it is the one that hands touch."""
         return None
 
     @abstractmethod
     def scaled(self, factor: float) -> Shape:
-        """So many times as large."""
+        """Return a copy with all lengths multiplied by `factor`."""
 
     def closest(self, p_O: Vector) -> Place:
-        """The surface point closest to a point in the object frame [m]."""
+        """Return the surface point closest to a point p_O in the object frame [m]."""
         vector("p_O", p_O, 3)
         return self._closest(np.array(p_O, float))
 
     def place(self, face: str, u: float, v: float) -> Place:
-        """A point of a face by its coordinates in [0, 1].
+        """Return the point of a face at coordinates u and v in [0, 1].
 
         Raises:
             InvalidInputError: There is no such face, or a coordinate is outside.
@@ -113,5 +113,5 @@ class Shape(Settings, ABC):
 
 
 def cyclic(axis: str, along: float, first: float, second: float) -> Vector:
-    """A vector by its components along an axis and along the two that come after it."""
+    """Return the vector with these components along an axis and the two that follow it."""
     return triple(np.roll([along, first, second], AXES.index(axis)))

@@ -25,7 +25,7 @@ Length = Annotated[Positive, Key("length_m")]
 # Flat pieces of a hollow cylinder's wall. Their middles lie on its surfaces; where two meet, they
 # are 0.5 % of the radius, R (1 - cos(pi / 32)), inside the outer one.
 _STAVES = 32
-# What turns the z axis to the axis of a name.
+# Rotations from the z axis to each axis.
 _TURNS: dict[Axis, Quaternion] = {
     "x": (math.sqrt(0.5), 0.0, math.sqrt(0.5), 0.0),
     "y": (math.sqrt(0.5), -math.sqrt(0.5), 0.0, 0.0),
@@ -35,9 +35,10 @@ _TURNS: dict[Axis, Quaternion] = {
 
 @dataclass(frozen=True)
 class Box(Shape):
-    """A cuboid along the object's axes, about its origin; faces "+x", "-x", "+y", "-y", "+z", "-z".
+    """A cuboid centred on the origin; faces "+x", "-x", "+y", "-y", "+z", "-z".
 
-    On a face across an axis u runs along the next one (after z comes x), v along the third.
+    Its edges are along the object's axes. On a face normal to an axis, u runs along the next axis
+    (after z comes x) and v along the third.
     """
 
     size: Annotated[tuple[Positive, Positive, Positive], Key("size_m")]
@@ -50,21 +51,21 @@ class Box(Shape):
 
     @property
     def volume(self) -> float:
-        """[m^3]."""
+        """Volume [m^3]."""
         return math.prod(self.size)
 
     def inertia(self, mass: float) -> Vector:
-        """Principal moments about the centre of mass, if homogeneous [kg m^2]."""
+        """Return the principal moments [kg m^2] about the centre of mass for uniform density."""
         (x, y, z), twelfth = self.size, mass / 12.0
         return (twelfth * (y**2 + z**2), twelfth * (x**2 + z**2), twelfth * (x**2 + y**2))
 
     def geoms(self, name: str, rgba: Color = COLOR) -> tuple[Geom, ...]:
-        """One geom of the given name."""
+        """Return one geom of the given name."""
         x, y, z = self.size
         return (Geom(name, "box", (x / 2, y / 2, z / 2), rgba=rgba),)
 
     def scaled(self, factor: float) -> Box:
-        """So many times as large."""
+        """Return a copy with all lengths multiplied by `factor`."""
         return Box(triple(factor * np.array(self.size)))
 
     def _closest(self, p_O: Array) -> Place:
@@ -84,7 +85,7 @@ class Box(Shape):
 
 
 class _Round(Shape):
-    """What full and hollow cylinders share: walls about an axis, and two ends."""
+    """Base class of full and hollow cylinders: walls about an axis, and two ends."""
 
     length: Length
     axis: Axis
@@ -92,7 +93,7 @@ class _Round(Shape):
     @property
     @abstractmethod
     def _walls(self) -> dict[str, float]:
-        """Radius [m] of every wall, by the name of its face; the outer one is the first."""
+        """Radius [m] of every wall by the name of its face, the outer wall first."""
 
     @property
     def faces(self) -> tuple[str, ...]:
@@ -101,18 +102,18 @@ class _Round(Shape):
 
     @property
     def _radii(self) -> tuple[float, float]:
-        """Of the bore and of the outside [m]."""
+        """Inner and outer radius [m]; the inner one is 0 without a bore."""
         outer, *inner = self._walls.values()
         return (inner[0] if inner else 0.0), outer
 
     @property
     def volume(self) -> float:
-        """[m^3]."""
+        """Volume [m^3]."""
         inner, outer = self._radii
         return math.pi * (outer**2 - inner**2) * self.length
 
     def inertia(self, mass: float) -> Vector:
-        """Principal moments about the centre of mass, if homogeneous [kg m^2]."""
+        """Return the principal moments [kg m^2] about the centre of mass for uniform density."""
         inner, outer = self._radii
         along = mass / 2 * (outer**2 + inner**2)
         across = mass / 12 * (3 * (outer**2 + inner**2) + self.length**2)
@@ -145,7 +146,7 @@ class _Round(Shape):
         return self._at(face, inner + v * (outer - inner), 2 * math.pi * u, along)
 
     def _at(self, face: str, radius: float, angle: float, along: float) -> Place:
-        """The point at a radius [m], an angle about the axis [rad] and a place along it [m]."""
+        """Return the point at a radius [m], an angle [rad] about and a place [m] along the axis."""
         across = (math.cos(angle), math.sin(angle))
         point = cyclic(self.axis, along, radius * across[0], radius * across[1])
         if face in self._walls:
@@ -160,8 +161,8 @@ class _Round(Shape):
 class Cylinder(_Round):
     """A solid cylinder about the origin; faces "side" and the ends, by default "+z" and "-z".
 
-    On the side u goes round, beginning at the axis after its own (x after z), and v along it; on an
-    end u goes round, too, and v from the middle to the rim.
+    On the side, u runs around the axis, starting at the object axis that follows it (x after z),
+    and v along it. On an end, u runs around, too, and v from the middle to the rim.
     """
 
     radius: Annotated[Positive, Key("radius_m")]
@@ -171,18 +172,18 @@ class Cylinder(_Round):
     """Length [m]."""
 
     axis: Axis = "z"
-    """Which of the object's axes is the cylinder's."""
+    """Axis of the object that is the cylinder's axis."""
 
     @property
     def _walls(self) -> dict[str, float]:
         return {"side": self.radius}
 
     def geoms(self, name: str, rgba: Color = COLOR) -> tuple[Geom, ...]:
-        """One geom of the given name."""
+        """Return one geom of the given name."""
         return (self._full(name, rgba),)
 
     def scaled(self, factor: float) -> Cylinder:
-        """So many times as large."""
+        """Return a copy with all lengths multiplied by `factor`."""
         return replace(self, radius=factor * self.radius, length=factor * self.length)
 
 
@@ -190,8 +191,8 @@ class Cylinder(_Round):
 class HollowCylinder(_Round):
     """A tube about the origin; faces "outside", "inside" and the ends, by default "+z" and "-z".
 
-    Coordinates are as a :class:`Cylinder`'s, but that v on an end goes from the bore to the rim,
-    and u on a wall in steps: what hands hold are flat staves, which are touched in their middles.
+    Coordinates are those of a :class:`Cylinder`, with two differences: on an end, v runs from the
+    bore to the rim; on a wall, u goes in steps, since hands touch flat staves in their middles.
     """
 
     outer_radius: Annotated[Positive, Key("outer_radius_m")]
@@ -204,7 +205,7 @@ class HollowCylinder(_Round):
     """Length [m]."""
 
     axis: Axis = "z"
-    """Which of the object's axes is the cylinder's."""
+    """Axis of the object that is the cylinder's axis."""
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -222,18 +223,18 @@ class HollowCylinder(_Round):
         return "rim"
 
     def geoms(self, name: str, rgba: Color = COLOR) -> tuple[Geom, ...]:
-        """An invisible full cylinder ``rim``, and the staves ``wall``, ``stave_1``, ``stave_2`` ..
+        """Return an invisible full cylinder ``rim`` and the staves ``wall``, ``stave_1`` ..
 
-        Supports touch the rim, as a full cylinder has exact rim points, and a finger may be inside
-        it. Hands touch staves; ``wall`` is the one at the second axis after the own (z for x).
+        Supports touch the rim, since a full cylinder has exact rim points; a finger may be inside
+        it. Hands touch staves; ``wall`` is at the second axis after the cylinder's (z for x).
         """
         rim = self._full("rim", (0.0, 0.0, 0.0, 0.0), solid=False)
         return (rim, *(self._stave(i, rgba) for i in range(_STAVES)))
 
     def _stave(self, i: int, rgba: Color) -> Geom:
-        """A flat piece of the wall, counted from the second axis after the own.
+        """Return flat piece i of the wall, counted from the second axis after the cylinder's.
 
-        Neighbours meet at the bore: pieces that overlap would show through one another.
+        Neighbours meet at the bore: overlapping pieces would show through each other.
         """
         inner, outer = self._radii
         angle, middle = 2 * math.pi * i / _STAVES, (outer + inner) / 2
@@ -244,13 +245,13 @@ class HollowCylinder(_Round):
         return Geom(_stave_name(i), "box", cyclic(self.axis, *half), pose, rgba)
 
     def touched(self, name: str, p_O: Vector) -> str:
-        """Name of that of its staves which a hand touches at a place."""
+        """Return the name of the stave that a hand at p_O [m] touches."""
         _, first, second = np.roll(p_O, -AXES.index(self.axis)).tolist()
         turns = (math.atan2(second, first) - math.pi / 2) / (2 * math.pi)
         return _stave_name(round(turns * _STAVES) % _STAVES)
 
     def scaled(self, factor: float) -> HollowCylinder:
-        """So many times as large."""
+        """Return a copy with all lengths multiplied by `factor`."""
         inner, outer = self._radii
         return HollowCylinder(factor * outer, factor * inner, factor * self.length, self.axis)
 
@@ -264,26 +265,26 @@ def _stave_name(i: int) -> str:
 
 @dataclass(frozen=True)
 class MeshShape(Shape):
-    """A closed mesh of any shape, in the frame of its file; its one face is "surface".
+    """A closed mesh of any shape, in the frame of its file; its only face is "surface".
 
-    Contacts touch the mesh's convex hull, so that places in its hollows are no contacts. On the
-    surface u goes round the z axis through the centre of mass, beginning at x, and v from its
-    lower to its upper end; counted is the outermost point in that direction.
+    Contacts are made with the mesh's convex hull, so hollows cannot be touched. u is the angle
+    about the z axis through the centre of mass, from x; v runs from the lower to the upper end.
+    The place is the outermost point of the surface in that direction.
     """
 
     file: Text
-    """STL, OBJ or PLY file, relative to this file and in or below its folder."""
+    """STL, OBJ or PLY file, relative to the scenario file and in or below its folder."""
 
     scale: Positive = 1.0
     """Metres per unit of the file."""
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        self.mesh  # noqa: B018 - raises where it is no mesh
+        self.mesh  # noqa: B018 - raises if the file holds no valid mesh
 
     @cached_property
     def mesh(self) -> Mesh:
-        """What the file holds, scaled."""
+        """Mesh of the file, scaled."""
         return read_mesh("shape.file", self.file, (self.scale,))
 
     @property
@@ -293,12 +294,12 @@ class MeshShape(Shape):
 
     @property
     def volume(self) -> float:
-        """[m^3]."""
+        """Volume [m^3]."""
         return self.mesh.volume
 
     @property
     def center(self) -> Vector:
-        """Centre of mass, if homogeneous, in the object frame [m]."""
+        """Centre of mass in the object frame for uniform density [m]."""
         return triple(self.mesh.center)
 
     @property
@@ -307,15 +308,15 @@ class MeshShape(Shape):
         return wxyz(Rotation.from_matrix(self.mesh.axes))
 
     def inertia(self, mass: float) -> Vector:
-        """Principal moments about the centre of mass, if homogeneous [kg m^2]."""
+        """Return the principal moments [kg m^2] about the centre of mass for uniform density."""
         return triple(mass * self.mesh.moments)
 
     def geoms(self, name: str, rgba: Color = COLOR) -> tuple[Geom, ...]:
-        """One geom of the given name."""
+        """Return one geom of the given name."""
         return (Geom(name, "mesh", (self.scale,), rgba=rgba, file=self.file),)
 
     def scaled(self, factor: float) -> MeshShape:
-        """So many times as large."""
+        """Return a copy with all lengths multiplied by `factor`."""
         return MeshShape(self.file, factor * self.scale)
 
     def _closest(self, p_O: Array) -> Place:

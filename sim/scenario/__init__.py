@@ -1,4 +1,4 @@
-"""What a scenario says: object, contacts, robots, path, phases, control, physics, tolerances."""
+"""Scenario data: object, contacts, robots, path, phases, control, physics, tolerances."""
 
 from fulcrum.sim.scenario.contacts import Friction, Hand, Rest, Support
 from fulcrum.sim.scenario.control import (

@@ -1,4 +1,4 @@
-"""Where hands and supports touch the object, and with what friction."""
+"""Contacts of a scenario: hands, supports and rests, with friction and material."""
 
 from __future__ import annotations
 
@@ -22,30 +22,30 @@ class Friction(Settings):
     """Coefficient of friction [-]."""
 
     e_n: Annotated[Positive | None, Key("torsion_m")] = None
-    """Torsional over tangential friction [m], of a soft contact: two thirds of the radius of a
-    round pad under even pressure; a hard point without it."""
+    """Torsional over tangential friction [m] of a soft contact: two thirds of the radius of a
+    round pad under even pressure. Without it the contact is a hard point."""
 
 
 @dataclass(frozen=True)
 class Hand:
     """A robot's end effector and the place where it holds the object.
 
-    The contact axes are n = ``normal_O``, t = ``tangent_O`` and o = n x t; the hand's tip axes (x,
-    y, z) coincide with (t, o, n), so that the hand turns with the object.
+    The contact axes are n = ``normal_O``, t = ``tangent_O`` and o = n x t. The hand's tip axes (x,
+    y, z) coincide with (t, o, n), so the hand turns with the object.
 
     Attributes:
         name: Name of the contact and prefix of the hand's parts.
-        mount: Body of a robot that carries the hand, with the robot's prefix.
-        model: Name of one that ships (see ``assets.HANDS``), or path of an MJCF file with a body
+        mount: Name of the robot's body that carries the hand, with the robot's prefix.
+        model: Name of a shipped hand (see ``assets.HANDS``), or path of an MJCF file with a body
             ``pad`` that has a spherical geom ``tip`` and a site ``tip_center``.
-        geom: The object's geom that is touched.
+        geom: Name of the object's geom that is touched.
         p_OC_O: Contact point in the object frame [m].
         normal_O: Inward normal in the object's axes.
         tangent_O: First tangent in the object's axes, perpendicular to the normal.
-        friction: Between tip and object.
+        friction: Friction between tip and object.
         f_n_max: Largest allowed normal force [N].
-        mount_pose: Of the body ``pad`` on the mount.
-        material: Of tip and object against each other.
+        mount_pose: Pose of the body ``pad`` on the mount.
+        material: Stiffness and damping of tip and object together.
     """
 
     name: str
@@ -73,13 +73,13 @@ class Support:
 
     Attributes:
         name: Name of the contact.
-        geom: The object's geom that touches.
+        geom: Name of the object's geom that touches.
         surface: Name of the environment's geom that is touched.
-        p_OP_O: The point in the object frame [m].
+        p_OP_O: Contact point in the object frame [m].
         normal_W: Surface normal in world axes, into the object.
         tangent_W: First tangent in world axes, perpendicular to the normal.
-        friction: Between object and surface.
-        material: Of object and surface against each other.
+        friction: Friction between object and surface.
+        material: Stiffness and damping of object and surface together.
     """
 
     name: str
@@ -98,13 +98,13 @@ class Support:
 
 @dataclass(frozen=True)
 class Rest:
-    """Where the object may lie on the environment without the synthesis counting on it.
+    """A place where the object may lie on the environment; the synthesis does not count on it.
 
     Attributes:
-        geom: The object's geom that touches.
+        geom: Name of the object's geom that touches.
         surface: Name of the environment's geom that is touched.
-        friction: Between object and surface.
-        material: Of object and surface against each other.
+        friction: Friction between object and surface.
+        material: Stiffness and damping of object and surface together.
     """
 
     geom: str

@@ -1,4 +1,4 @@
-"""How forces are synthesised and followed, and when the guard steps in."""
+"""Settings of force synthesis, impedance and guard; the named controllers."""
 
 from __future__ import annotations
 
@@ -14,81 +14,80 @@ from fulcrum.synthesis.settings import Inline, Key, NotNegative, OrInfinite, Set
 
 @dataclass(frozen=True)
 class Robustness(Settings):
-    """What a grip is to bear."""
+    """What the grip must withstand."""
 
     uncertainty: Annotated[UncertaintySet, Inline] = UncertaintySet()
-    """The worlds that it serves, with the true friction."""
+    """Deviations from the scenario with its true friction, all of which the grip withstands."""
 
     preload: Annotated[NotNegative, Key("preload_n")] = 0.0
-    """Least normal force of the hands [N], against pushes that no grip alone withstands: stiff
-    hands and their friction do."""
+    """Least normal force of the hands [N]. It covers pushes that only stiff hands and their
+    friction withstand."""
 
     reaction: Annotated[NotNegative, Key("reaction_n")] = 0.0
-    """By how much harder the hands may press while the impedance holds more than was expected
-    [N]."""
+    """Largest extra normal force of the hands [N] while the impedance holds more than expected."""
 
 
-# An infinite threshold is none.
+# An infinite threshold is never reached.
 Threshold = Annotated[float, Gt(0), OrInfinite]
 
 
 @dataclass(frozen=True)
 class Guard(Settings):
-    """When a run counts as in trouble."""
+    """Thresholds at which the guard holds, lowers or stops a run."""
 
     silence_s: Threshold = 0.05
-    """How long the drives go on without a setpoint [s]."""
+    """Longest time that the drives continue without a setpoint [s]."""
 
     no_forces_s: Threshold = 0.1
-    """How long the synthesis may find no forces [s]."""
+    """Longest time that the synthesis may find no forces [s]."""
 
     blind_s: Threshold = 0.05
-    """How long the object's pose may be missing [s]."""
+    """Longest time that the object's pose may be missing [s]."""
 
     tilt_error_deg: Threshold = 6.0
-    """Tilt error, low-pass filtered [deg]."""
+    """Largest tilt error, low-pass filtered [deg]."""
 
     joint_error: Threshold = 0.1
-    """Deviation of a joint from its path [rad or m], if it is also pulled hard."""
+    """Largest deviation of a joint from its path [rad or m]; counts together with joint_pull."""
 
     joint_pull: Threshold = 0.3
-    """Torque with which the impedance pulls it, as a share of its limit [-]."""
+    """Largest impedance torque at that joint, as a share of its limit [-]."""
 
     saturated_s: Threshold = 0.05
-    """How long a torque may be cut at its limit while there is grip [s]."""
+    """Longest time that a torque may be cut at its limit while there is grip [s]."""
 
     torque_error: Threshold = 0.25
-    """Motor's torque against the commanded one, as a share of its limit [-]."""
+    """Largest difference of measured and commanded motor torque, as a share of the limit [-]."""
 
     contact_error: Annotated[Threshold, Key("contact_error_m")] = 0.05
-    """Distance of a hand's tip from its contact on the object as seen [m]."""
+    """Largest distance of a hand's tip from its contact on the measured object [m]."""
 
     hold_s: Threshold = 0.5
-    """How long a hold waits for a cause to pass [s]."""
+    """Longest time that a hold waits for its cause to pass [s]."""
 
     holds_s: Threshold = 5.0
-    """How long all holds of a run may take together [s]."""
+    """Longest total time of all holds of a run [s]."""
 
     lower_s: Threshold = 2.0
-    """How long lowering may be blocked [s]."""
+    """Longest time that lowering may be blocked [s]."""
 
 
 @dataclass(frozen=True)
 class Control(Settings):
-    """How forces are synthesised and followed by controller margin; the others are made of it."""
+    """Settings of controller margin; the other controllers are derived from it."""
 
     friction_factor: Annotated[float, Gt(0), Le(1.0)] = 0.8
-    """Share of the believed friction that the synthesis may use [-]; 1 puts the optimum on the
-    cone, where it slips."""
+    """Share of the believed friction that the synthesis may use [-]. At 1 the optimum lies on the
+    friction cone, where contacts slip."""
 
     preload: Annotated[NotNegative, Key("preload_n")] = 5.0
     """Least normal force of the hands [N]."""
 
     objective: Objective = Objective.MAX_NORMAL_FORCE
-    """What the synthesis minimises."""
+    """Objective that the synthesis minimises."""
 
     feedforward: bool = True
-    """Whether synthesised torques are applied at all."""
+    """Whether synthesised torques are applied."""
 
     solve_every: Annotated[int, Ge(1)] = 4
     """Physics steps per synthesis."""
@@ -97,22 +96,22 @@ class Control(Settings):
     """Natural frequency of the joint impedance, which is critically damped [rad/s]."""
 
     yielding_squeeze: bool = True
-    """Whether the impedance leaves the hands' squeeze to the feed-forward; else it holds back hands
-    that sink into soft contacts."""
+    """Whether the impedance leaves the hands' squeeze to the feed-forward. Otherwise it holds back
+    hands that sink into soft contacts."""
 
     robustness: Robustness | None = None
-    """What the grip has to bear beyond the fixed margins of friction_factor and preload_n;
-    controller robust has its own."""
+    """What the grip must withstand beyond the margins friction_factor and preload_n; controller
+    robust has its own."""
 
     inertia: bool = False
-    """Whether forces and torques also accelerate object and robot as the path's timing asks; else
-    both are those of rest."""
+    """Whether forces and torques include the inertia of object and robot on the timed path;
+    otherwise they are those at rest."""
 
     pose_filter_s: NotNegative = 0.0
-    """Time constant with which the object's measured pose is smoothed [s]."""
+    """Time constant of the low-pass filter on the object's measured pose [s]."""
 
     guard: Guard = Guard()
-    """When the run is held, lowered or stopped."""
+    """Thresholds at which the run is held, lowered or stopped."""
 
 
 _ROBUSTNESS = Robustness(
@@ -123,13 +122,14 @@ _ROBUSTNESS = Robustness(
 
 
 def controllers(control: Control) -> dict[str, Control]:
-    """The controllers by name, made from a scenario's own control.
+    """Return the controllers by name, derived from a scenario's control.
 
-    ``robust`` presses hard enough for every world of an uncertainty set, smooths the measured
-    pose and follows the path more stiffly; ``dynamic`` also makes the forces and torques that the
-    motion itself takes, for fast tilts; ``margin`` is the scenario's own control; ``paper`` is
-    (17) as printed, with the full friction and no preload; ``no-feedforward`` applies joint
-    impedance and gravity compensation alone.
+    - ``robust`` presses hard enough for every world of an uncertainty set, smooths the measured
+      pose and follows the path more stiffly.
+    - ``dynamic`` adds the forces and torques of the motion itself, for fast tilts.
+    - ``margin`` is the scenario's own control.
+    - ``paper`` is (17) as printed, with the full friction and no preload.
+    - ``no-feedforward`` applies only joint impedance and gravity compensation.
     """
     return {
         "robust": replace(
@@ -152,10 +152,10 @@ def controllers(control: Control) -> dict[str, Control]:
 
 
 def controller(control: Control, name: str, field: str = "controller") -> Control:
-    """One of :func:`controllers`.
+    """Return one of :func:`controllers` by name.
 
     Raises:
-        InvalidInputError: There is none of that name; names the field that it was given in.
+        InvalidInputError: There is none of that name; names the `field`.
     """
     known = controllers(control)
     if name not in known:
@@ -164,11 +164,11 @@ def controller(control: Control, name: str, field: str = "controller") -> Contro
 
 
 def default_controller(planned: bool) -> str:
-    """The controller that suits: only ``dynamic`` counts with the inertia of a planned tilt."""
+    """Return the default controller: ``dynamic`` for a planned tilt, else ``robust``."""
     return "dynamic" if planned else "robust"
 
 
 def comparable(control: Control, planned: bool) -> tuple[str, ...]:
-    """Return the controllers with feed-forward that suit: with inertia for a planned tilt."""
+    """Return the controllers with feed-forward; for a planned tilt, those with inertia."""
     known = controllers(control).items()
     return tuple(name for name, c in known if c.feedforward and c.inertia is planned)

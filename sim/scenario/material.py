@@ -1,4 +1,4 @@
-"""What a contact is made of, as it is measured on a bench: stiffness and damping."""
+"""Material of a contact: stiffness and damping, as measured on a bench."""
 
 from __future__ import annotations
 
@@ -13,12 +13,12 @@ from fulcrum.synthesis.checks import positive
 class ContactMaterial:
     r"""Stiffness and damping of a contact along its normal: :math:`f = K x + D \dot x`.
 
-    x is how far the two bodies have come together since they touched. Pad and object (or object
-    and support) are two springs in a row; K is that of both together.
+    x is the approach of the two bodies since they touched [m]. Pad and object (or object and
+    support) are two springs in series; K is the stiffness of both together.
 
     Attributes:
         stiffness: K [N/m].
-        damping_s: D / K [s]: the time constant with which a loaded contact that is let go opens.
+        damping_s: D / K [s], the time constant with which a released contact opens.
     """
 
     stiffness: float
@@ -37,7 +37,7 @@ class ContactMaterial:
     def hertz(
         modulus: float, radius: float, load: float, damping_s: float, poisson: float = 0.5
     ) -> ContactMaterial:
-        r"""A ball on a flat that is much harder, at a load.
+        r"""Return the material of a ball on a much harder flat, at a load.
 
         .. math:: F = \tfrac43 E^* \sqrt R\, x^{3/2}, \qquad E^* = \frac{E}{1 - \nu^2}, \qquad
             K = \frac{\mathrm d F}{\mathrm d x} = \left( 6\, E^{*2} R\, F \right)^{1/3}
@@ -59,7 +59,7 @@ class ContactMaterial:
         return ContactMaterial(math.cbrt(6.0 * effective**2 * radius * load), damping_s)
 
     def scaled(self, factor: float) -> ContactMaterial:
-        """The same, with its stiffness and damping multiplied by a factor."""
+        """Return a copy with stiffness and damping multiplied by `factor`."""
         return ContactMaterial(factor * self.stiffness, self.damping_s)
 
 
@@ -67,6 +67,6 @@ class ContactMaterial:
 # N/m. Rubber loses little: D / K = 2 ms.
 PAD = ContactMaterial(stiffness=4e4, damping_s=0.002)
 
-# The edge of a packed object on a table: a stated value, ten times a pad. Damping of 5 ms lets an
-# edge that is set down come to rest at once; with 2 ms it chatters.
+# The edge of a packed object on a table: an assumed value, ten times that of a pad. With D / K =
+# 5 ms an edge that is set down comes to rest at once; with 2 ms it chatters.
 SUPPORT = ContactMaterial(stiffness=4e5, damping_s=0.005)

@@ -1,4 +1,4 @@
-"""What the path of an object is given as: a screw motion, or poses that it passes."""
+"""The path of an object as given: a screw motion, or a list of poses."""
 
 from __future__ import annotations
 
@@ -15,9 +15,9 @@ from fulcrum.synthesis import InvalidInputError
 from fulcrum.synthesis.arrays import Array, Vector
 from fulcrum.synthesis.settings import Settings
 
-# The tilt is an angle: where the object does not turn, it would stand still [deg].
+# Least turn of a path and between poses [deg]: the tilt is an angle, so every part must turn.
 _LEAST_TURN_DEG = 0.01
-# A measured orientation has to say where on the path the object is.
+# Less than a turn: a measured orientation must determine the place on the path.
 _MOST_DEG = 180.0
 Angle = Annotated[float, Gt(0), Lt(_MOST_DEG)]
 
@@ -33,7 +33,7 @@ class Pivot(Settings):
     """A point on the axis [m]."""
 
     axis_W: Vector
-    """Direction of the axis; the tilt is positive by the right-hand rule."""
+    """Direction of the axis in the world; the tilt is positive by the right-hand rule."""
 
     angle_deg: Angle = 90.0
     """Tilt at the end [deg]."""
@@ -42,11 +42,11 @@ class Pivot(Settings):
     """Advance along the axis [m/rad]."""
 
     travel: Vector = (0.0, 0.0, 0.0)
-    """Translation on top, in proportion to the tilt, at the end [m]."""
+    """Additional translation at the end [m]; it grows in proportion to the tilt."""
 
     @property
     def label(self) -> str:
-        """What errors call the path."""
+        """Name of the path in error messages."""
         return "path"
 
     def __post_init__(self) -> None:
@@ -56,20 +56,20 @@ class Pivot(Settings):
         super().__post_init__()
 
     def scaled(self, factor: float) -> Pivot:
-        """That of an object which is so many times as large, about the same axis."""
+        """Return the path of an object larger by `factor`, about the same axis."""
         point = np.asarray(self.point_W)
         return replace(self, start=_scaled(self.start, factor, point))
 
 
 @dataclass(frozen=True)
 class Poses:
-    """The path of the object: poses that it passes, smoothly in between.
+    """The path of the object: a smooth motion through given poses.
 
-    The tilt is the angle by which the object has turned, added up from pose to pose; so every pose
-    is turned against the one before. Two poses are joined by a screw motion.
+    The tilt is the sum of the angles from pose to pose, so each pose must be turned against the
+    one before. Two poses are joined by a screw motion.
 
     Attributes:
-        poses: At least two; the first is that at tilt 0.
+        poses: Two or more poses of the object in the world; the first is at tilt 0.
     """
 
     poses: tuple[Pose, ...]
@@ -114,10 +114,10 @@ class Poses:
 
     @cached_property
     def pivot_O(self) -> Array:
-        """The point of the object that keeps its place best [m], (3,), in the object frame.
+        """Point of the object that moves least [m], (3,), in the object frame.
 
-        That of a screw motion is on its axis. It minimises the sum of squares of R c + p - m over
-        c and m, where m is the mean of its places.
+        It is the c that minimises the sum over the poses of ``|R c + p - m|^2``, where m is the
+        mean of the point's places. For a screw motion it lies on the axis.
         """
         R, p = self.rotations.as_matrix(), self.positions
         both = np.concatenate([R, np.broadcast_to(-np.eye(3), R.shape)], axis=2)
@@ -125,16 +125,16 @@ class Poses:
 
     @cached_property
     def point_W(self) -> Vector:
-        """Where that point is at the start [m]."""
+        """Place of :attr:`pivot_O` in the world at the start [m]."""
         return triple(self.positions[0] + self.rotations[0].apply(self.pivot_O))
 
     def scaled(self, factor: float) -> Poses:
-        """That of an object which is so many times as large, about the same point."""
+        """Return the path of an object larger by `factor`, about the same point."""
         point = np.asarray(self.point_W)
         return Poses(tuple(_scaled(pose, factor, point) for pose in self.poses))
 
 
 def _scaled(pose: Pose, factor: float, point: Array) -> Pose:
     p_WO = np.asarray(pose.position)
-    # Of a factor of 1 not even the last bit differs.
+    # A factor of 1 returns exactly the same numbers.
     return replace(pose, position=triple(p_WO + (factor - 1.0) * (p_WO - point)))

@@ -1,4 +1,4 @@
-"""The phases of a manoeuvre: what each brings tilt, hands and grip to."""
+"""Phases of a manoeuvre: tilt, gap and grip at the end of each."""
 
 from __future__ import annotations
 
@@ -12,18 +12,18 @@ from fulcrum.sim.scenario.timing import Timing
 from fulcrum.synthesis import InvalidInputError
 from fulcrum.synthesis.settings import Key, NotNegative, Settings, Share, Text
 
-# A trace takes about 2 kB per step: a gigabyte in ten minutes.
+# Bounded by memory: a trace takes about 2 kB per step, a gigabyte in ten minutes.
 Duration = Annotated[float, Gt(0), Le(600.0)]
-# No arm reaches farther, and the joint path takes a step every 5 mm.
+# No arm reaches farther; the joint path has a step every 5 mm.
 Gap = Annotated[NotNegative, Le(10.0)]
 
 
 @dataclass(frozen=True)
 class Phase(Settings):
-    """A stretch of the manoeuvre: what it brings tilt, hands and grip to."""
+    """A part of the manoeuvre, given by tilt, gap and grip at its end."""
 
     name: Text
-    """What it is called."""
+    """Name of the phase."""
 
     duration_s: Duration
     """Duration [s]."""
@@ -38,11 +38,11 @@ class Phase(Settings):
     """Share of the synthesised forces that is applied at the end [-]."""
 
     timing: Annotated[Timing | None, Key(None)] = None
-    """How it goes there, in that duration; None for minimum jerk."""
+    """Timing of the progress, of the same duration; None for minimum jerk."""
 
     @property
     def label(self) -> str:
-        """What errors call the phase."""
+        """Name of the phase in error messages."""
         return f"phase {self.name}"
 
     def __post_init__(self) -> None:
@@ -57,7 +57,7 @@ class Phase(Settings):
 STANDOFF = 0.06  # [m] of the hands from the object before and after they hold it
 
 
-# Approach fast and touch slowly; what comes after the tilt depends on whether the object can stand.
+# Approach fast, touch slowly. What follows the tilt depends on whether the object can stand.
 REACH = (
     Phase("approach", 1.5, tilt=0.0, gap=0.005, grip=0.0),
     Phase("touch", 0.8, tilt=0.0, gap=0.0, grip=0.0),
@@ -80,13 +80,13 @@ LEAVE = (
 
 
 def tilting(phases: tuple[Phase, ...]) -> tuple[int, ...]:
-    """Indices of the phases that tilt the object."""
+    """Return the indices of the phases that tilt the object."""
     before = (0.0, *(phase.tilt for phase in phases))
     return tuple(i for i, phase in enumerate(phases) if phase.tilt != before[i])
 
 
 def stretched(phases: tuple[Phase, ...], duration_s: float) -> tuple[Phase, ...]:
-    """The phases with every one that tilts the object taking the given time [s]."""
+    """Return the phases, with the given duration [s] for each one that tilts the object."""
     turns = tilting(phases)
     return tuple(
         replace(phase, duration_s=duration_s, timing=None) if i in turns else phase

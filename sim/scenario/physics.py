@@ -1,4 +1,4 @@
-"""The contact solver's settings, and what counts as success."""
+"""Settings of the contact solver, and the tolerances that define success."""
 
 from __future__ import annotations
 
@@ -10,96 +10,95 @@ from annotated_types import Ge, Gt, Le
 
 from fulcrum.synthesis.settings import Key, Positive, Settings, Unlimited
 
-# A run's steps are to be counted, and kept.
+# Bounds keep the number of recorded steps of a run finite.
 TimeStep = Annotated[float, Ge(1e-5), Le(1.0), Key("timestep_s")]
-# As many iterations per step as a run can wait for.
+# Bounded so that a step ends in reasonable time.
 Iterations = Annotated[int, Ge(0), Le(10_000)]
 
 
 @dataclass(frozen=True)
 class Physics(Settings):
-    """Settings of the contact solver; the defaults decide neither how a run ends nor the forces."""
+    """Settings of the contact solver; outcome and forces do not depend on the defaults."""
 
     timestep: TimeStep = 0.001
     """Time step [s]."""
 
-    # Friction rows yield with its inverse. With 100 an edge of a shipped scene carries 2.6 % of its
-    # peak (RMS) more or less without noslip than with it, with 1e4 0.1 %.
+    # Compliance of friction rows is proportional to its inverse. With and without noslip, the force
+    # of an edge of a shipped scene differs by 2.6 % of its peak (RMS) at 100, and by 0.1 % at 1e4.
     impratio: Positive = 1e4
-    """Frictional to normal constraint impedance [-]."""
+    """Ratio of frictional to normal constraint impedance [-]."""
 
     noslip_iterations: Iterations = 10
     """Iterations of the noslip post-processing."""
 
 
-# None, where it is infinite.
+# An infinite limit means that the quantity is not judged.
 Limit = Annotated[float, Gt(0), Unlimited]
 LimitOrZero = Annotated[float, Ge(0), Unlimited]
 
 
 @dataclass(frozen=True)
 class Judged(Settings):
-    """What a run is judged by; inf, or false, means that something is not judged."""
+    """Limits that a run is judged by; inf or false means that a quantity is not judged."""
 
     final_deg: Limit = 0.1
     """Deviation of the final tilt [deg]."""
 
     final_mm: Limit = 1.0
-    """Distance of the object from where the path puts it, at the end: root mean square over its
-    mass, so that it counts turns about any axis, too [mm]."""
+    """Distance of the object from the end of its path [mm]: root mean square over its mass, so
+    turns about any axis count, too."""
 
     error_deg: Limit = 0.2
     """Tilt error at any time [deg]."""
 
     slip_mm: Limit = 0.2
-    """Drift of the points that touch [mm]. What is below 0.1 mm is numerical: at steps of 1 ms
-    contacts that stick creep by up to that in MuJoCo and in Drake, at half the step by half."""
+    """Drift of contact points [mm]. Below 0.1 mm it is numerical: at steps of 1 ms, sticking
+    contacts creep by up to 0.1 mm in MuJoCo and in Drake, and by half at half the step."""
 
     support_slip_mm: Limit | None = None
-    """The same of supports [mm]; slip_mm, if it is left out."""
+    """Drift of supports [mm]; slip_mm if left out."""
 
     slide_mm: Limit | None = None
-    """How far contacts slide in all [mm]; slip_mm, if it is left out."""
+    """Total sliding distance of a contact [mm]; slip_mm if left out."""
 
     spin_deg: Limit = 0.1
-    """Turn about the contact normal [deg]."""
+    """Turn of a contact about its normal [deg]."""
 
     utilisation: Limit = 0.95
-    """Friction utilisation in the plant [-]; not of supports that hold the same point, which share
-    it as they happen to."""
+    """Friction utilisation in the plant [-]. Supports that hold the same point are not judged,
+    since statics does not determine how they share the load."""
 
     force_error: Limit = 0.03
-    """RMS of a hand's measured minus commanded normal force, over the peak commanded one [-]."""
+    """RMS of a hand's measured minus commanded normal force, over its peak commanded force [-]."""
 
     support_force_error: Limit = 0.05
-    """The same of a support [-]; of supports that hold the same point that of their force
-    together."""
+    """The same for a support [-]. Supports that hold the same point are judged by their sum."""
 
     saturated_s: LimitOrZero = 0.0
-    """How long a torque may be cut at its limit at a stretch [s]."""
+    """Longest uninterrupted time that a torque may be cut at its limit [s]."""
 
     lost_s: LimitOrZero = 0.005
-    """How long a contact may let go at a stretch [s]; gaps are reported in any case."""
+    """Longest uninterrupted time that a contact may be open [s]; gaps are always reported."""
 
     support_lost_s: LimitOrZero | None = None
-    """The same of supports [s]; lost_s, if it is left out."""
+    """The same for supports [s]; lost_s if left out."""
 
     impact: Limit = 1.0
-    """Normal force of a hand that comes or goes, over its largest grip [-]."""
+    """Normal force of an approaching or withdrawing hand, over its largest grip [-]."""
 
     collisions: bool = True
-    """Whether contacts that the scenario does not want are failures."""
+    """Whether unwanted contacts are failures."""
 
     no_forces: bool = True
-    """Whether it is a failure if the synthesis finds no forces."""
+    """Whether a synthesis without solution is a failure."""
 
     given_up: bool = True
-    """Whether it is a failure if the guard lowers the object or stops the run."""
+    """Whether lowering or stopping by the guard is a failure."""
 
 
 @dataclass(frozen=True)
 class Disturbed(Judged):
-    """What a run in a drawn world is judged by: the result, and what hands and motors bear."""
+    """Limits for a run in a drawn world: the result, and the loads on hands and motors."""
 
     final_deg: Limit = 2.0
     final_mm: Limit = 10.0
@@ -121,7 +120,7 @@ class Disturbed(Judged):
 
 @dataclass(frozen=True)
 class Tolerances(Judged):
-    """What counts as success; inf, or false, means that something is not judged."""
+    """Limits that define success; inf or false means that a quantity is not judged."""
 
     disturbed: Disturbed = Disturbed()
-    """The same for runs with --preset or --world, and for sweeps."""
+    """Limits for runs with --preset or --world, and for sweeps."""

@@ -1,4 +1,4 @@
-"""A robot of a scenario: its model, its place, its start posture and its limits."""
+"""A robot of a scenario: model, base, start posture and limits."""
 
 from __future__ import annotations
 
@@ -11,22 +11,22 @@ from fulcrum.synthesis.settings import NotNegative, Positive, Settings
 
 @dataclass(frozen=True)
 class Robot(Settings):
-    """A robot, its place and its start posture; joints go by their names in the model."""
+    """A robot, its base and its start posture; joints have their names in the model."""
 
     model: str
-    """Name of one that ships (see ``assets.ROBOTS``), or path of a URDF or MJCF file;
-    ``assets/README.md`` says what is taken from it."""
+    """Name of a shipped robot (see ``assets.ROBOTS``), or path of a URDF or MJCF file;
+    ``assets/README.md`` says what is read from it."""
 
     posture: dict[str, float]
-    """Start angle [rad or m] of every joint that is driven, from which inverse kinematics seeks;
-    the other joints are locked at 0."""
+    """Start angle [rad or m] of every driven joint, where inverse kinematics begins; the other
+    joints are locked at 0."""
 
     prefix: str = ""
-    """What stands before the names of its bodies and joints; robots of a scene differ in it."""
+    """Prefix of the names of its bodies and joints, different for each robot of a scene."""
 
     still: tuple[str, ...] = ()
-    """Joints that move along the path only if the others cannot do it alone, such as the fingers
-    of a gripper."""
+    """Joints that move along the path only if the others cannot follow it alone, such as the
+    fingers of a gripper."""
 
     base: Pose = Pose()
     """Pose of the model's root in the world."""
@@ -35,11 +35,12 @@ class Robot(Settings):
     """Standard deviation of the real start posture from the planned one [rad or m]."""
 
     torque_limits: dict[str, Positive] = field(default_factory=dict)
-    """Largest torques or forces [N m or N] that are asked of joints; they lower what the model
-    says, or supply what it lacks."""
+    """Largest commanded torques or forces of joints [N m or N]. They lower the model's limits, or
+    replace missing ones."""
 
     speed_limits: dict[str, Positive] = field(default_factory=dict)
-    """The same for speeds [rad/s or m/s]."""
+    """Largest speeds of joints [rad/s or m/s]. They lower the model's limits, or replace missing
+    ones."""
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -50,5 +51,5 @@ class Robot(Settings):
 
     @property
     def label(self) -> str:
-        """What messages call it."""
+        """Name of the robot in messages."""
         return f"{self.prefix}robot"

@@ -1,4 +1,4 @@
-"""What a scenario is: frozen data about object, contacts, robot, path and how it is run."""
+"""The scenario: frozen data about object, contacts, robots, path and execution."""
 
 from __future__ import annotations
 
@@ -21,18 +21,18 @@ from fulcrum.synthesis.settings import Key, Settings, check
 
 @dataclass(frozen=True)
 class View(Settings):
-    """Where recordings look from, relative to the path's point."""
+    """Viewpoint of recordings, relative to the path's point."""
 
     eye: Annotated[Vector, Key("eye_m")] = (1.0, -0.5, 0.62)
-    """Where the eye stands [m]."""
+    """Position of the eye [m]."""
 
     target: Annotated[Vector, Key("target_m")] = (0.05, 0.0, 0.12)
-    """What it looks at [m]."""
+    """Point that the eye looks at [m]."""
 
 
 @dataclass(frozen=True)
 class Scenario:
-    """Everything that a run needs to know; nothing else may distinguish one scene from another."""
+    """All data of a scene that a run needs; scenes differ in nothing else."""
 
     name: str
     summary: str
@@ -45,14 +45,14 @@ class Scenario:
     robots: tuple[Robot, ...]
     path: Pivot | Poses
     rests: tuple[Rest, ...] = ()
-    """Where the object may lie besides its supports."""
+    """Places where the object may lie besides its supports."""
 
     phases: tuple[Phase, ...] = (*REACH, *TILT, *HOLD)
     standoff: float = STANDOFF
     """Distance of the hands from their contacts at the start [m]."""
 
     holdable: bool = True
-    """Whether forces that hold the object are expected all along the path."""
+    """Whether forces that hold the object are expected to exist along the whole path."""
 
     control: Control = Control()
     physics: Physics = Physics()
@@ -92,7 +92,7 @@ class Scenario:
 
     @property
     def contact_names(self) -> tuple[str, ...]:
-        """Names of all contacts, hands first: the order of every per-contact array."""
+        """Names of all contacts, hands first, in the order of every per-contact array."""
         return (*(hand.name for hand in self.hands), *(support.name for support in self.supports))
 
     @property
@@ -103,7 +103,7 @@ class Scenario:
 
     @property
     def still(self) -> tuple[str, ...]:
-        """Joints that keep still where they can, by their names in the scene."""
+        """Joints that move only if the others cannot follow alone, by their names in the scene."""
         return tuple(robot.prefix + joint for robot in self.robots for joint in robot.still)
 
     @property
@@ -167,7 +167,7 @@ class Scenario:
 
 
 def lifted(scenario: Scenario) -> Scenario:
-    """The scenario without its environment contacts: the object lies there, but is to come off."""
+    """Return the scenario with its supports turned into rests, for an object that is lifted off."""
     rests = {Rest(s.geom, s.surface, s.friction, s.material) for s in scenario.supports}
     rests |= set(scenario.rests)
     ordered = tuple(sorted(rests, key=lambda rest: (rest.surface, rest.geom)))

@@ -1,4 +1,4 @@
-"""The timing of a phase: accelerations that are constant between the points of a grid."""
+"""The timing of a phase: constant acceleration between the points of a grid."""
 
 from __future__ import annotations
 
@@ -15,15 +15,15 @@ from fulcrum.synthesis.arrays import Array
 class Timing:
     r"""How a phase's progress :math:`p` goes from 0 to 1: :math:`\dot p^2` is linear in it.
 
-    That is the motion of :mod:`synthesis.path.problem`. Where a progress comes twice, the rate
-    jumps there, as it does for who was pushed.
+    It is linear between grid points, as in :mod:`synthesis.path.problem`. The rate jumps where the
+    grid has the same progress twice.
 
     Attributes:
-        progress: Grid [-], (k,), from 0 to 1, not falling.
-        squared_rates: :math:`\dot p^2` at its points [1/s^2], (k,).
+        progress: Grid of progresses [-], (k,), from 0 to 1, non-decreasing.
+        squared_rates: :math:`\dot p^2` at the grid points [1/s^2], (k,).
 
     Raises:
-        InvalidInputError: There is no such motion.
+        InvalidInputError: The arrays describe no motion from 0 to 1.
     """
 
     progress: tuple[float, ...]
@@ -46,12 +46,12 @@ class Timing:
 
     @property
     def duration(self) -> float:
-        """[s]."""
+        """Duration [s]."""
         return float(self._pieces[0][-1])
 
     @cached_property
     def _pieces(self) -> tuple[Array, Array, Array, Array]:
-        """Times, progresses of the grid, (k,); starting rates and accelerations, (k - 1,)."""
+        """Times and progresses of the grid, (k,); starting rates and accelerations, (k - 1,)."""
         p, b = np.asarray(self.progress, float), np.asarray(self.squared_rates, float)
         rate, step = np.sqrt(b), np.diff(p)
         moving = step > 0.0
@@ -62,9 +62,9 @@ class Timing:
         return np.concatenate([[0.0], np.cumsum(lasts)]), p, rate[:-1], acceleration
 
     def at(self, elapsed: Array | float) -> tuple[Array, Array, Array]:
-        """Progress, its rate [1/s] and acceleration [1/s^2] at times since the start [s].
+        """Return progress, rate [1/s] and acceleration [1/s^2] at times since the start [s].
 
-        Before the start and after the end it rests.
+        Rate and acceleration are zero before the start and after the end.
         """
         times, p, rates, accelerations = self._pieces
         k = np.clip(np.searchsorted(times, elapsed, side="right") - 1, 0, len(rates) - 1)
@@ -75,7 +75,7 @@ class Timing:
         return np.clip(progress, 0.0, 1.0), rate, np.where(rests, 0.0, a)
 
     def times(self, progress: Array | float) -> Array:
-        """When progresses are first reached, counted from the start [s]."""
+        """Return the times since the start [s] at which progresses are first reached."""
         times, p, rates, accelerations = self._pieces
         k = np.clip(np.searchsorted(p, progress, side="left") - 1, 0, len(rates) - 1)
         way = progress - p[k]
