@@ -1,4 +1,4 @@
-"""The scenarios: every file in the folder ``scenes`` is one, found by being present."""
+"""The scenarios: every file in the folder ``scenes`` is one."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ __all__ = ["scenario", "scenarios"]
 
 
 def __getattr__(name: str) -> Any:
-    """Import late: the command line, which is in this package, answers `--help` without them."""
+    """Import late: the command line, in this package, prints its help without them."""
     if name not in __all__:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
     from fulcrum.scenarios.reading import library

@@ -9,7 +9,9 @@ import re
 import sys
 import traceback
 from collections.abc import Sequence
-from typing import Annotated
+from functools import reduce
+from operator import or_
+from typing import Annotated, Any, Protocol
 
 import tyro
 
@@ -20,6 +22,7 @@ from fulcrum.scenarios.commands.common import (
     INTERRUPTED,
     PASSED,
     Chosen,
+    CommandLineError,
 )
 from fulcrum.scenarios.commands.crosscheck import CrosscheckCommand
 from fulcrum.scenarios.commands.explain import CapacityCommand, ExplainCommand
@@ -31,25 +34,35 @@ from fulcrum.scenarios.commands.reproduce import ReproduceCommand
 from fulcrum.scenarios.commands.run import RunCommand
 from fulcrum.scenarios.commands.sweep import SweepCommand
 from fulcrum.scenarios.commands.view import ScreenshotCommand, ViewCommand
+from fulcrum.synthesis import FulcrumError
 
 # Heavy packages are imported by the commands that need them: `fulcrum --help` answers at once.
 
-
-AnyCommand = (
-    Annotated[ListCommand, tyro.conf.subcommand("list")]
-    | Annotated[RunCommand, tyro.conf.subcommand("run")]
-    | Annotated[ScreenshotCommand, tyro.conf.subcommand("screenshot")]
-    | Annotated[ViewCommand, tyro.conf.subcommand("view")]
-    | Annotated[ExplainCommand, tyro.conf.subcommand("explain")]
-    | Annotated[CheckCommand, tyro.conf.subcommand("check")]
-    | Annotated[NewCommand, tyro.conf.subcommand("new")]
-    | Annotated[CapacityCommand, tyro.conf.subcommand("capacity")]
-    | Annotated[PlaceCommand, tyro.conf.subcommand("place")]
-    | Annotated[PlanCommand, tyro.conf.subcommand("plan")]
-    | Annotated[ReproduceCommand, tyro.conf.subcommand("reproduce")]
-    | Annotated[CrosscheckCommand, tyro.conf.subcommand("crosscheck")]
-    | Annotated[SweepCommand, tyro.conf.subcommand("sweep")]
+COMMANDS = {
+    "list": ListCommand,
+    "run": RunCommand,
+    "screenshot": ScreenshotCommand,
+    "view": ViewCommand,
+    "explain": ExplainCommand,
+    "check": CheckCommand,
+    "new": NewCommand,
+    "capacity": CapacityCommand,
+    "place": PlaceCommand,
+    "plan": PlanCommand,
+    "reproduce": ReproduceCommand,
+    "crosscheck": CrosscheckCommand,
+    "sweep": SweepCommand,
+}
+AnyCommand: Any = reduce(
+    or_, (Annotated[kind, tyro.conf.subcommand(name)] for name, kind in COMMANDS.items())
 )
+
+
+class Command(Protocol):
+    """A command with its options."""
+
+    def execute(self) -> int:
+        """Run the command; return the exit code."""
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -58,7 +71,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     0 pass, 1 failed its checks, 2 bad input, 70 a bug, 130 interrupted.
     """
     arguments = sys.argv[1:] if arguments is None else arguments
-    command = None
+    command: Command | None = None
     try:
         if list(arguments) == ["--version"]:
             print(_versions())
@@ -69,8 +82,6 @@ def main(arguments: Sequence[str] | None = None) -> int:
         print("fulcrum: interrupted.", file=sys.stderr)
         return INTERRUPTED
     except Exception as error:
-        from fulcrum.synthesis import FulcrumError
-
         if not isinstance(error, (FulcrumError, OSError)):
             traceback.print_exc()
             print("fulcrum: this is a bug; please report the lines above.", file=sys.stderr)
@@ -80,30 +91,37 @@ def main(arguments: Sequence[str] | None = None) -> int:
         return BAD_INPUT
 
 
-def _parse(
-    arguments: Sequence[str],
-) -> AnyCommand:
-    """Return the command asked for, with none the help; a parse error becomes one line."""
+def _parse(arguments: Sequence[str]) -> Command:
+    """Return the command asked for, or print the help; a parse error is raised as one line."""
     errors = io.StringIO()
     try:
         with contextlib.redirect_stderr(errors):
-            return tyro.cli(
-                AnyCommand, prog="fulcrum", description=_DESCRIPTION, args=arguments or ["--help"]
+            command: Command = tyro.cli(
+                AnyCommand,
+                prog="fulcrum",
+                description=_DESCRIPTION,
+                args=arguments or ["--help"],
+                config=(tyro.conf.FlagCreatePairsOff, tyro.conf.DisallowNone),
             )
+            return command
     except SystemExit as stop:
         if stop.code == 0:
             raise
-        from fulcrum.synthesis import InvalidInputError
-
         boxed = re.split(r"─{5,}", errors.getvalue())
         words = re.sub(r"[│╭╮╰╯─\s]+", " ", boxed[1] if len(boxed) > 1 else errors.getvalue())
-        raise InvalidInputError("command line", words.strip(), "as `fulcrum --help` says") from None
+        # tyro says of a missing option what it is for, and of a wrong value how it is parsed.
+        words = re.sub(r"^ Missing from [a-z ]+: (\S+) .*", r"\1 is missing", words)
+        wrong = r"Error parsing (\S+): no type matching \{?(.*?)\}? could .* from \[(.*?)\]\. .*"
+        words = re.sub(wrong, r"\1: got \3; valid is \2", words).strip(" .")
+        described = [word for word in arguments[:1] if word in COMMANDS]
+        help_line = " ".join(["fulcrum", *described, "--help"])
+        raise CommandLineError(f"{words}; see `{help_line}`.") from None
 
 
 _DESCRIPTION = (
     "Robots move objects too heavy to lift by leaning them on their surroundings: contact force "
-    "synthesis in a MuJoCo closed loop, recorded and checked. `fulcrum --version` prints the "
-    "versions of fulcrum and of what its numbers depend on."
+    "synthesis in a MuJoCo closed loop, recorded and judged. `fulcrum --version` prints the "
+    "versions of fulcrum and of the packages that its numbers depend on."
 )
 # Whose versions a report of a bug needs.
 _PACKAGES = ("mujoco", "dm-control", "clarabel", "pin", "mink", "rerun-sdk")

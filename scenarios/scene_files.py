@@ -1,4 +1,4 @@
-"""Writes what is made of scenarios: scenes that MuJoCo's own viewer opens, and the schema."""
+"""Writes the files made from scenarios: scenes for MuJoCo's own viewer, and the schema."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from fulcrum.sim.scenario import Scenario
 
 
 def scene_xml(scenario: Scenario) -> str:
-    """The scene's MJCF, with the start as its keyframe ``start``."""
+    """Return the scene's MJCF, with the start as its keyframe ``start``."""
     plant = MujocoPlant(scenario)
     plant.reset(plan_joints(scenario).start)
     spec = compose(scenario)
@@ -25,12 +25,12 @@ def scene_xml(scenario: Scenario) -> str:
 
 
 def schema_json() -> str:
-    """The JSON Schema of scenario files, as it is published."""
+    """Return the JSON Schema of scenario files, as it is published."""
     return json.dumps(schema(), indent=2) + "\n"
 
 
 def main() -> None:
-    """Rewrites the files."""
+    """Rewrite the files."""
     SCHEMA.write_text(schema_json())
     for scenario in scenarios().values():
         (Path(assets.__file__).parent / f"{scenario.name}.xml").write_text(scene_xml(scenario))

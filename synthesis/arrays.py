@@ -1,4 +1,4 @@
-"""Types of arrays and vectors, and where the components of a contact wrench stand."""
+"""Types of arrays and vectors, and positions of the components in a contact wrench."""
 
 from __future__ import annotations
 

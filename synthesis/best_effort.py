@@ -1,13 +1,12 @@
-r"""Forces for an infeasible problem: within all limits, as near to equilibrium as they get.
+r"""Forces for an infeasible problem: within all limits, as close to equilibrium as possible.
 
 .. math::
 
     \text{minimise}\quad \left\| D (G F + w_{ext}) \right\|_2 + \epsilon \max F_n
     \quad\text{subject to (5), (6), (7), (15), (16)}
 
-with D dividing moments by the contacts' largest distance from the point B that they are about, so
-that force and moment count alike, and a small weight on the grip that picks the smallest of equal
-forces.
+D divides moments by the contacts' largest distance from their reference point B, so that force and
+moment count alike. The small weight on the grip selects the smallest of equally good forces.
 """
 
 from __future__ import annotations
@@ -23,19 +22,19 @@ from fulcrum.synthesis.conic import ConicForm
 from fulcrum.synthesis.errors import SolverError
 from fulcrum.synthesis.problem import Objective, Problem
 from fulcrum.synthesis.solution import InfeasibleError, certificate
-from fulcrum.synthesis.solver import SOLVED, fallback_settings, solver_settings
+from fulcrum.synthesis.solver import SOLVED, attempts
 
 _GRIP_WEIGHT = 1e-4
 
 
 @dataclass(frozen=True, eq=False)
 class BestEffort:
-    """Forces that keep every limit but not the balance.
+    """Forces that satisfy every limit, but not equilibrium.
 
     Attributes:
         w_OC_C: Wrenches on the object in contact axes [N, N·m], (m, 6).
         tau: Joint torques [N·m or N], (l,).
-        imbalance: What is left of (12), with moments about B, in the object's axes [N, N·m], (6,).
+        imbalance: Residual of (12) in the object's axes, moments about B [N, N·m], (6,).
     """
 
     w_OC_C: Array
@@ -44,11 +43,11 @@ class BestEffort:
 
 
 def best_effort(problem: Problem) -> BestEffort:
-    """Solves the relaxed problem; its objective is replaced.
+    """Return the forces closest to equilibrium; the problem's objective is not used.
 
     Raises:
         InfeasibleError: The limits contradict each other even without equilibrium.
-        SolverError: The solver gave neither forces nor a proof.
+        SolverError: The solver found neither forces nor a proof.
     """
     problem = replace(problem, objective=Objective.MAX_NORMAL_FORCE)
     form = ConicForm(problem)
@@ -63,26 +62,15 @@ def best_effort(problem: Problem) -> BestEffort:
     rest = np.column_stack([A[balance.stop :], np.zeros(form.rows - balance.stop)])
     q = np.zeros(form.columns + 1)
     q[form.aux_column], q[-1] = _GRIP_WEIGHT, 1.0
-    program = (
-        sp.csc_matrix((len(q), len(q))),
-        q,
-        sp.csc_matrix(np.vstack([cone, rest])),
-        np.concatenate([[0.0], weights * b[balance], b[balance.stop :]]),
-        [clarabel.SecondOrderConeT(7), *form.clarabel_cones[1:]],
-    )
-    for settings in (solver_settings(), *fallback_settings()):
-        result = clarabel.DefaultSolver(*program, settings).solve()
-        if str(result.status) in (*SOLVED, "PrimalInfeasible"):
-            break
-    if str(result.status) == "PrimalInfeasible":
-        z = np.array(result.z)
-        ray = form.multipliers(problem, np.concatenate([weights * z[1:7], z[7:]]))
-        raise InfeasibleError(certificate(problem, ray))
-    if str(result.status) not in SOLVED:
-        raise SolverError(str(result.status))
-    w_OC_C = form.wrenches(problem, np.array(result.x)[:-1])
-    return BestEffort(
-        w_OC_C=w_OC_C,
-        tau=problem.torque(w_OC_C),
-        imbalance=np.einsum("mkj,mj->k", problem.G, w_OC_C) + problem.w_ext_B,
-    )
+    right = np.concatenate([[0.0], weights * b[balance], b[balance.stop :]])
+    cones = [clarabel.SecondOrderConeT(7), *form.clarabel_cones[1:]]
+    status = ""
+    for status, result in attempts(q, sp.csc_matrix(np.vstack([cone, rest])), right, cones):
+        if status == "PrimalInfeasible":
+            z = np.array(result.z)
+            ray = form.multipliers(problem, np.concatenate([weights * z[1:7], z[7:]]))
+            raise InfeasibleError(certificate(problem, ray))
+        if status in SOLVED:
+            w_OC_C = form.wrenches(problem, np.array(result.x)[:-1])
+            return BestEffort(w_OC_C, problem.torque(w_OC_C), problem.imbalance(w_OC_C))
+    raise SolverError(status)

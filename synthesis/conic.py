@@ -19,15 +19,14 @@ objective, cone         :math:`\|F_n\| \le \lambda` or :math:`\|\tau\| \le \lamb
 k per contact           :math:`f_i \in \mathcal{K}_i`                           cone
 ======================  ======================================================  ===================
 
-For the friction margin the cones read :math:`\|f_t\| \le s f_n + \lambda d_i` with parameters
-:math:`s, d_i`, and all contacts count as preloaded, for at :math:`s = 0` the cones leave
-:math:`f_n` free; see :mod:`synthesis.synthesizer`.
+For the friction margin the cones are :math:`\|f_t\| \le s f_n + \lambda d_i` with parameters
+:math:`s, d_i`, and all contacts count as preloaded, because at :math:`s = 0` the cones leave
+:math:`f_n` free; see :mod:`synthesis.friction_margin`. Without the torque limits the form is a
+relaxation, with two thirds fewer entries for two arms of seven joints; see
+:mod:`synthesis.synthesizer`.
 
-Without the torque limits the form is a relaxation, with two thirds fewer entries for
-two arms of seven joints; see :mod:`synthesis.synthesizer`.
-
-All forces and torques are in units of :meth:`ConicForm.force_unit`, so that the solver's tolerances
-are relative to the load. The equations are homogeneous in them: A does not change.
+All forces and torques are in units of :attr:`Problem.unit`, so that the solver's tolerances are
+relative to the load. The equations are homogeneous in them: A does not change.
 """
 
 from __future__ import annotations
@@ -38,9 +37,8 @@ from typing import Any
 
 import clarabel
 import numpy as np
-from numpy.typing import NDArray
 
-from fulcrum.synthesis.arrays import Array, N
+from fulcrum.synthesis.arrays import Array, Indices, Mask, N
 from fulcrum.synthesis.problem import Objective, Problem
 from fulcrum.synthesis.solution import Multipliers
 
@@ -48,82 +46,70 @@ _LINEAR_IN_TORQUE = (Objective.MAX_TORQUE, Objective.MAX_TORQUE_UTILISATION)
 
 
 def structure(problem: Problem, torque_limits: bool = True) -> Hashable:
-    """What two problems must share to be solved by the same prebuilt solver."""
+    """Return a key that is equal for two problems which the same prebuilt solver can solve."""
     joints = problem.joints
     limits: Hashable = None
     if joints is not None and torque_limits:
         limits = np.isfinite(joints.tau_min).tobytes(), np.isfinite(joints.tau_max).tobytes()
-    return (
-        problem.contact_set.structure,
-        problem.objective,
-        0 if joints is None else len(joints.names),
-        limits,
-    )
+    names = () if joints is None else joints.names
+    return problem.contact_set.structure, problem.objective, len(names), limits
 
 
 class ConicForm:
-    """Index maps of one problem structure, made once; numbers flow through them at each solve."""
+    """Index maps of one problem structure, made once and used for the numbers of each solve."""
 
     def __init__(self, problem: Problem, torque_limits: bool = True) -> None:
-        """Lays out rows and columns.
+        """Lay out rows and columns.
 
         Args:
             problem: Any problem of the structure.
             torque_limits: Whether (16) has rows; without them the form is a relaxation.
         """
-        contacts, joints, objective = problem.contacts, problem.joints, problem.objective
-        facts = problem.contact_set
-        widths, starts = facts.widths, facts.starts
-        self.m = len(contacts)
-        self.objective = objective
-        self.normal_columns = starts[:-1]
-        self.aux_column = int(starts[-1])
+        joints, facts = problem.joints, problem.contact_set
+        self.m, self.objective = len(problem.contacts), problem.objective
+        self.normal_columns, self.aux_column = facts.starts[:-1], int(facts.starts[-1])
         self.columns = self.aux_column + 1
         # Flat position in the (m, 6) wrenches of each variable.
         self.flat = facts.flat
-        hands = list(facts.hands)
-        self.hand_columns = np.flatnonzero(np.isin(self.flat // 6, hands))
-        hand_rank = {i: rank for rank, i in enumerate(hands)}
-        self.hand_flat = np.array(
-            [6 * hand_rank[f // 6] + f % 6 for f in self.flat[self.hand_columns]], dtype=np.intp
-        )
-        self.hand_normals = self.normal_columns[hands]
-        # Flat position in the (m, 6, 6) grasp maps of each entry of the equilibrium rows.
         contact, component = np.divmod(self.flat, 6)
+        hands = np.array(facts.hands, dtype=np.intp)
+        self.hand_normals = self.normal_columns[hands]
+        self.hand_columns = np.flatnonzero(np.isin(contact, hands))
+        # Flat position in the (n, 6) wrenches of the hands.
+        rank = np.searchsorted(hands, contact[self.hand_columns])
+        self.hand_flat = 6 * rank + component[self.hand_columns]
+        # Flat position in the (m, 6, 6) grasp maps of each entry of the equilibrium rows.
         self._G_entries = 36 * contact + 6 * np.arange(6)[:, None] + component
 
-        margin = objective is Objective.FRICTION_MARGIN
-        preloaded = [
-            c.f_n_min > 0.0 or w == 1 or margin for c, w in zip(contacts, widths, strict=True)
-        ]
-        self.preloaded = np.flatnonzero(preloaded)
+        widths = np.array(facts.widths)
+        margin = self.objective is Objective.FRICTION_MARGIN
+        self.preloaded = np.flatnonzero((facts.f_n_min > 0.0) | (widths == 1) | margin)
         self.limited = np.flatnonzero(np.isfinite(facts.f_n_max))
-        self._bounds = np.concatenate([self.preloaded, len(contacts) + self.limited])
-        none = np.zeros(0, dtype=np.intp)
-        bounded = joints if torque_limits else None
-        self.upper = none if bounded is None else np.flatnonzero(np.isfinite(bounded.tau_max))
-        self.lower = none if bounded is None else np.flatnonzero(np.isfinite(bounded.tau_min))
-        self.cones = [(i, w) for i, w in enumerate(widths) if w > 1]
-        self._needs_torque = bool(self.upper.size or self.lower.size or objective.needs_joints)
-        self._lay_out_rows(0 if joints is None else len(joints.names), starts, widths)
-        self._lay_out_multipliers(0 if joints is None else len(joints.names), facts.f_n_min)
+        self._bounds = np.concatenate([self.preloaded, self.m + self.limited])
+        bounds = (joints.tau_max, joints.tau_min) if joints and torque_limits else ((), ())
+        self.upper, self.lower = (np.flatnonzero(np.isfinite(bound)) for bound in bounds)
+        self.cones = [(i, w) for i, w in enumerate(facts.widths) if w > 1]
+        self.cone_contacts = np.flatnonzero(widths > 1)
+        self.cone_variables = np.flatnonzero(widths[contact] > 1)
+        self._needs_torque = bool(self.upper.size or self.lower.size or self.objective.needs_joints)
+        l = 0 if joints is None else len(joints.names)
+        self._lay_out_rows(l)
+        self.cone_heads = self.cone_rows.start + np.flatnonzero(component[self.cone_variables] == N)
+        self._lay_out_multipliers(l, facts.f_n_min)
         self._constant = self._constant_entries()
 
-    def _lay_out_rows(self, l: int, starts: Array, widths: tuple[int, ...]) -> None:
+    def _lay_out_rows(self, l: int) -> None:
+        n = len(self.hand_normals)
         linear = {
-            Objective.MAX_NORMAL_FORCE: len(self.hand_normals),
+            Objective.MAX_NORMAL_FORCE: n,
             Objective.MAX_TORQUE: 2 * l,
             Objective.MAX_TORQUE_UTILISATION: 2 * l,
             Objective.FRICTION_MARGIN: 1,
         }.get(self.objective, 0)
-        cone = {
-            Objective.NORM_NORMAL_FORCE: 1 + len(self.hand_normals),
-            Objective.NORM_TORQUE: 1 + l,
-        }.get(self.objective, 0)
-        sizes = [6, len(self.preloaded), len(self.limited), len(self.upper), len(self.lower)]
-        sizes += [linear, cone, sum(w for _, w in self.cones)]
-        ends = np.cumsum(sizes)
-        slices = [slice(int(e) - s, int(e)) for e, s in zip(ends, sizes, strict=True)]
+        norm = {Objective.NORM_NORMAL_FORCE: 1 + n, Objective.NORM_TORQUE: 1 + l}
+        sizes = [len(each) for each in (self.preloaded, self.limited, self.upper, self.lower)]
+        sizes += [linear, norm.get(self.objective, 0), len(self.cone_variables)]
+        ends = np.cumsum([0, 6, *sizes]).tolist()
         (
             self.equilibrium_rows,
             self.f_n_min_rows,
@@ -133,19 +119,15 @@ class ConicForm:
             self.linear_rows,
             self.norm_rows,
             self.cone_rows,
-        ) = slices
-        self._bound_rows = slice(self.f_n_min_rows.start, self.f_n_max_rows.stop)
-        self.rows = int(ends[-1])
-        self.cone_variables = np.concatenate(
-            [np.arange(starts[i], starts[i] + w) for i, w in self.cones] or [np.zeros(0, np.intp)]
-        )
-        offsets = np.cumsum([0] + [w for _, w in self.cones])[:-1]
-        self.cone_heads = self.cone_rows.start + offsets
-        self.cone_contacts = np.array([i for i, _ in self.cones], dtype=np.intp)
+        ) = (slice(*pair) for pair in pairwise(ends))
+        # The rows of the norm after its head.
+        self._normed = slice(self.norm_rows.start + 1, self.norm_rows.stop)
+        self.bound_rows = slice(self.f_n_min_rows.start, self.tau_min_rows.stop)
+        self.rows = ends[-1]
 
     @property
     def clarabel_cones(self) -> list[Any]:
-        """The cones of the slacks, in the order of the rows."""
+        """Return the cones of the slacks, in the order of the rows."""
         cones = [clarabel.ZeroConeT(6)]
         if nonnegative := self.linear_rows.stop - self.equilibrium_rows.stop:
             cones.append(clarabel.NonnegativeConeT(nonnegative))
@@ -153,39 +135,34 @@ class ConicForm:
             cones.append(clarabel.SecondOrderConeT(norm))
         return cones + [clarabel.SecondOrderConeT(width) for _, width in self.cones]
 
-    def force_unit(self, problem: Problem) -> float:
-        """Unit of forces and torques inside the solver: the largest load [N or N·m]."""
-        return problem.load or 1.0
-
     def value_unit(self, problem: Problem) -> float:
-        """Unit of the auxiliary variable, and so of the objective, inside the solver."""
-        match self.objective:
-            case Objective.MAX_TORQUE_UTILISATION:
-                return self.force_unit(problem) / self._largest_limit(problem)
-            case Objective.FRICTION_MARGIN:
-                return 1.0
-            case _:
-                return self.force_unit(problem)
+        """Return the unit of the objective inside the solver [N, N·m or -]."""
+        if self.objective is Objective.FRICTION_MARGIN:
+            return 1.0
+        if self.objective is Objective.MAX_TORQUE_UTILISATION:
+            assert problem.joints is not None
+            return problem.unit / problem.joints.largest_limit
+        return problem.unit
 
     def matrices(
         self, problem: Problem, utilisation: float = 1.0, slack: Array | None = None
     ) -> tuple[Array, Array]:
-        """A, (rows, columns), dense, and b, (rows,), of one problem.
+        """Return A, (rows, columns), dense, and b, (rows,), of one problem.
 
         Args:
-            problem: A problem of this structure.
-            utilisation: The parameter s of the friction-margin problem [-].
-            slack: The parameters d of the friction-margin problem [N], (m,); default all one
-                force unit, with the bound lambda <= 0 that makes the cones hold as they stand.
+            problem: Problem of this structure.
+            utilisation: Parameter s of the friction-margin problem [-].
+            slack: Parameters d of the friction-margin problem [N], (m,). By default all are one
+                unit of force, with the bound lambda <= 0, and the cones hold as they are.
         """
         A = self._constant.copy()
         b = np.zeros(self.rows)
         facts = problem.contact_set
-        unit = self.force_unit(problem)
+        unit = problem.unit
         f = self.aux_column
         A[self.equilibrium_rows, :f] = problem.G.take(self._G_entries) * facts.scale
         b[self.equilibrium_rows] = -problem.w_ext_B
-        b[self._bound_rows] = facts.bounds.take(self._bounds)
+        b[self.f_n_min_rows.start : self.f_n_max_rows.stop] = facts.bounds.take(self._bounds)
         if self._needs_torque:
             self._torque_rows(A, b, problem, facts.scale)
         if self.objective is Objective.FRICTION_MARGIN:
@@ -195,7 +172,7 @@ class ConicForm:
         return A, b / unit
 
     def _constant_entries(self) -> Array:
-        """A, with zeros where its entries depend on the problem's numbers."""
+        """Return A with zeros where its entries depend on the problem's numbers."""
         A = np.zeros((self.rows, self.columns))
         f = self.aux_column
         _diagonal(A, self.f_n_min_rows, self.normal_columns[self.preloaded], -1.0)
@@ -206,8 +183,7 @@ class ConicForm:
                 A[self.linear_rows, f] = -1.0
             case Objective.NORM_NORMAL_FORCE:
                 A[self.norm_rows.start, f] = -1.0
-                normals = slice(self.norm_rows.start + 1, self.norm_rows.stop)
-                _diagonal(A, normals, self.hand_normals, -1.0)
+                _diagonal(A, self._normed, self.hand_normals, -1.0)
             case Objective.NORM_TORQUE:
                 A[self.norm_rows.start, f] = -1.0
             case Objective.FRICTION_MARGIN:
@@ -216,28 +192,27 @@ class ConicForm:
         return A
 
     def has_loose_limits(self, problem: Problem) -> bool:
-        """Whether rows of limits may need scaling: always, where they are torque limits."""
+        """Return whether rows of limits may need scaling; torque limits always may."""
         torque = self.upper.size or self.lower.size
-        return bool(torque or problem.contact_set.largest_bound > self.force_unit(problem))
+        return bool(torque or problem.contact_set.largest_bound > problem.unit)
 
     def row_scale(self, b: Array) -> Array:
-        """Factors, (rows,), that keep loose limits from drowning the load in the solver's norms."""
-        limits = slice(self.f_n_min_rows.start, self.tau_min_rows.stop)
+        """Return row factors, (rows,), so that loose limits do not dominate the solver's norms."""
         scale = np.ones(self.rows)
-        scale[limits] = 1.0 / np.maximum(1.0, np.abs(b[limits]))
+        scale[self.bound_rows] = 1.0 / np.maximum(1.0, np.abs(b[self.bound_rows]))
         return scale
 
-    def sparsity(self, problem: Problem) -> NDArray[np.bool_]:
-        """Where A may be non-zero in any problem of this structure, (rows, columns)."""
+    def sparsity(self, problem: Problem) -> Mask:
+        """Return where A may be non-zero in any problem of this structure, (rows, columns)."""
         mask = self.matrices(problem)[0] != 0.0
         mask[self.equilibrium_rows, : self.aux_column] = True
         dense = [self.tau_max_rows, self.tau_min_rows]
         if self.objective in _LINEAR_IN_TORQUE:
             dense.append(self.linear_rows)
         if self.objective is Objective.NORM_TORQUE:
-            dense.append(slice(self.norm_rows.start + 1, self.norm_rows.stop))
+            dense.append(self._normed)
         for rows in dense:
-            mask[np.arange(rows.start, rows.stop)[:, None], self.hand_columns] = True
+            mask[rows, self.hand_columns] = True
         return mask
 
     def _torque_rows(self, A: Array, b: Array, problem: Problem, scale: Array) -> None:
@@ -255,37 +230,27 @@ class ConicForm:
         if self.objective in _LINEAR_IN_TORQUE:
             A[self.linear_rows, :f] = np.vstack([JT, -JT])
             b[self.linear_rows] = np.concatenate([-joints.tau_g, joints.tau_g])
-            A[self.linear_rows, f] = -self._torque_bounds(problem)
+            bounds = np.ones(2 * l)
+            if self.objective is Objective.MAX_TORQUE_UTILISATION:
+                bounds = np.concatenate([joints.tau_max, -joints.tau_min]) / joints.largest_limit
+            A[self.linear_rows, f] = -bounds
         elif self.objective is Objective.NORM_TORQUE:
-            A[self.norm_rows.start + 1 : self.norm_rows.stop, :f] = -JT
-            b[self.norm_rows.start + 1 : self.norm_rows.stop] = joints.tau_g
-
-    def _torque_bounds(self, problem: Problem) -> Array:
-        joints = problem.joints
-        assert joints is not None
-        if self.objective is Objective.MAX_TORQUE:
-            return np.ones(2 * len(joints.names))
-        return np.concatenate([joints.tau_max, -joints.tau_min]) / self._largest_limit(problem)
-
-    def _largest_limit(self, problem: Problem) -> float:
-        joints = problem.joints
-        assert joints is not None
-        return float(max(joints.tau_max.max(), -joints.tau_min.min()))
+            A[self._normed, :f] = -JT
+            b[self._normed] = joints.tau_g
 
     def value(self, problem: Problem, x: Array) -> float:
-        """The objective, bounded by the auxiliary variable of x [N, N·m or -]."""
+        """Return the objective at the variables x [N, N·m or -]."""
         return float(x[self.aux_column]) * self.value_unit(problem)
 
     def wrenches(self, problem: Problem, x: Array) -> Array:
-        """Contact wrenches, (m, 6), of the variables x."""
+        """Return the contact wrenches, (m, 6), at the variables x."""
         w_OC_C = np.zeros(6 * self.m)
-        unit = self.force_unit(problem)
-        w_OC_C[self.flat] = x[: self.aux_column] * problem.contact_set.scale * unit
+        w_OC_C[self.flat] = x[: self.aux_column] * problem.contact_set.scale * problem.unit
         return w_OC_C.reshape(self.m, 6)
 
     def multipliers(self, problem: Problem, z: Array, utilisation: float = 1.0) -> Multipliers:
-        """The dual variables z by the names of their constraints; parameters as in matrices."""
-        z = z * (self.value_unit(problem) / self.force_unit(problem))
+        """Return the dual variables z by constraint; `utilisation` as in :meth:`matrices`."""
+        z = z * (self.value_unit(problem) / problem.unit)
         named = np.zeros(self._named_ends[-1])
         named[self._named] = z[self._named_rows]
         equilibrium, cone, f_n_min, f_n_max, tau_min, tau_max = (
@@ -293,26 +258,24 @@ class ConicForm:
         )
         cone = cone.reshape(self.m, 6)
         cone *= problem.contact_set.reciprocal
-        if self.objective is Objective.FRICTION_MARGIN:
-            cone[self.cone_contacts, N] *= utilisation
         match self.objective:
+            case Objective.FRICTION_MARGIN:
+                cone[self.cone_contacts, N] *= utilisation
+                gradient = np.zeros(0)
             case Objective.MAX_NORMAL_FORCE:
                 gradient = z[self.linear_rows]
             case Objective.MAX_TORQUE | Objective.MAX_TORQUE_UTILISATION:
                 up, down = np.split(z[self.linear_rows], 2)
                 gradient = up - down
-            case Objective.FRICTION_MARGIN:
-                gradient = np.zeros(0)
             case _:
-                gradient = -z[self.norm_rows.start + 1 : self.norm_rows.stop]
+                gradient = -z[self._normed]
         return Multipliers(equilibrium, cone, f_n_min, f_n_max, tau_min, tau_max, gradient)
 
     def _lay_out_multipliers(self, l: int, preloads: Array) -> None:
-        """Where each row's multiplier goes in one array of all named ones."""
-        ends = np.cumsum([0, 6, 6 * self.m, self.m, self.m, l, l])
-        self._named_ends = [int(end) for end in ends]
+        """Set where each row's multiplier goes in one array of all named multipliers."""
+        self._named_ends = np.cumsum([0, 6, 6 * self.m, self.m, self.m, l, l]).tolist()
         _, cone, f_n_min, f_n_max, tau_min, tau_max, _ = self._named_ends
-        # A frictionless contact's cone is f_n >= 0: that is its preload row with f_n_min = 0.
+        # The cone of a frictionless contact is f_n >= 0: its preload row with f_n_min = 0.
         contacts = self.preloaded
         smooth = ~np.isin(contacts, self.cone_contacts) & (preloads[contacts] == 0.0)
         self._named = np.concatenate(
@@ -325,9 +288,8 @@ class ConicForm:
                 cone + self.flat[self.cone_variables],
             ]
         )
-        bounds = np.arange(self.tau_min_rows.stop)
-        self._named_rows = np.concatenate([bounds, np.arange(self.rows)[self.cone_rows]])
+        self._named_rows = np.r_[: self.tau_min_rows.stop, self.cone_rows]
 
 
-def _diagonal(A: Array, rows: slice, columns: Array, value: float) -> None:
+def _diagonal(A: Array, rows: slice, columns: Indices, value: float) -> None:
     A[np.arange(rows.start, rows.stop), columns] = value

@@ -10,12 +10,13 @@ from functools import cached_property, lru_cache
 
 import numpy as np
 
-from fulcrum.synthesis.arrays import M_N, Array, N, O, T
+from fulcrum.synthesis.arrays import M_N, Array, Indices, N, O, T
+from fulcrum.synthesis.checks import not_negative, positive
 from fulcrum.synthesis.errors import InvalidInputError
 
 
 class ContactModel(StrEnum):
-    """Which components of the wrench a contact transmits."""
+    """The components of the wrench that a contact transmits."""
 
     FRICTIONLESS = "frictionless"
     PCWF = "point-contact-with-friction"
@@ -23,8 +24,13 @@ class ContactModel(StrEnum):
 
     @property
     def components(self) -> tuple[int, ...]:
-        """Transmitted components, the normal force first, as the friction cone orders them."""
+        """Return the transmitted components in the order of the friction cone, normal first."""
         return _COMPONENTS[self]
+
+    @property
+    def has_friction(self) -> bool:
+        """Return whether tangential forces are transmitted."""
+        return self is not ContactModel.FRICTIONLESS
 
 
 _COMPONENTS = {
@@ -35,7 +41,7 @@ _COMPONENTS = {
 
 
 class Role(StrEnum):
-    """Who pushes on the object: a hand, whose force costs joint torque, or the environment."""
+    """What pushes on the object: a hand, whose force needs joint torque, or the environment."""
 
     HAND = "hand"
     ENVIRONMENT = "environment"
@@ -43,7 +49,7 @@ class Role(StrEnum):
 
 @dataclass(frozen=True)
 class Contact:
-    r"""A contact's model and parameters; its friction cone, (1) to (4) of the paper, is
+    r"""Model and parameters of a contact. Its friction cone, (1) to (4) of the paper, is
 
     .. math:: \sqrt{(f_t/e_t)^2 + (f_o/e_o)^2 + (m_n/e_n)^2} \le \mu f_n
 
@@ -52,8 +58,8 @@ class Contact:
     Attributes:
         name: Unique within a problem.
         role: Hand or environment.
-        model: What is transmitted.
-        mu: Friction coefficient [-], > 0; unused by a frictionless contact.
+        model: Which components are transmitted.
+        mu: Friction coefficient [-], > 0; not used by a frictionless contact.
         e_t: Ellipticity along t [-], > 0.
         e_o: Ellipticity along o [-], > 0.
         e_n: Ratio of torsional to tangential friction [m], > 0 (soft finger only).
@@ -77,51 +83,44 @@ class Contact:
     def __post_init__(self) -> None:
         if not self.name:
             raise InvalidInputError("contact.name", repr(self.name), "a non-empty name")
-        for field in () if self.model is ContactModel.FRICTIONLESS else ("mu", "e_t", "e_o", "e_n"):
-            value = getattr(self, field)
-            if not (math.isfinite(value) and value > 0.0):
-                remedy = "a finite number > 0"
-                if field == "mu":
-                    remedy += f" (without friction: model {ContactModel.FRICTIONLESS})"
-                raise InvalidInputError(f"contact {self.name}.{field}", value, remedy)
-        if not (math.isfinite(self.f_n_min) and self.f_n_min >= 0.0):
-            raise InvalidInputError(
-                f"contact {self.name}.f_n_min", self.f_n_min, "a finite number >= 0"
-            )
+        label = f"contact {self.name}"
+        if self.model.has_friction:
+            if not (math.isfinite(self.mu) and self.mu > 0.0):
+                valid = f"a finite number > 0 (without friction: model {ContactModel.FRICTIONLESS})"
+                raise InvalidInputError(f"{label}.mu", self.mu, valid)
+            for field in ("e_t", "e_o", "e_n"):
+                positive(f"{label}.{field}", getattr(self, field))
+        not_negative(f"{label}.f_n_min", self.f_n_min)
         if not self.f_n_max >= self.f_n_min:
-            raise InvalidInputError(
-                f"contact {self.name}.f_n_max", self.f_n_max, f"at least f_n_min = {self.f_n_min}"
-            )
+            valid = f"at least f_n_min = {self.f_n_min}"
+            raise InvalidInputError(f"{label}.f_n_max", self.f_n_max, valid)
 
     @cached_property
     def scale(self) -> Array:
-        """Scale of each transmitted component, (k,): the cone is ||f[1:]/scale[1:]|| <= f[0]."""
-        all_components = {
-            T: self.mu * self.e_t,
-            O: self.mu * self.e_o,
-            N: 1.0,
-            M_N: self.mu * self.e_n,
-        }
-        return np.array([all_components[c] for c in self.model.components])
+        """Return scales of the transmitted components, (k,): ||f[1:]/scale[1:]|| <= f[0]."""
+        scales = {T: self.mu * self.e_t, O: self.mu * self.e_o, N: 1.0, M_N: self.mu * self.e_n}
+        return np.array([scales[c] for c in self.model.components])
 
 
 class ContactSet:
-    """What follows from a tuple of contacts alone, as arrays.
+    """The parameters of a tuple of m contacts as arrays.
 
     Attributes:
         hands: Indices of the hand contacts, in order.
-        hand_rows: The same as an index of arrays with one row per contact; a slice where it can be.
+        hand_rows: The same as an index into arrays with one row per contact; a slice if possible.
+        rough: Whether each contact has friction, (m,).
         widths: Number of transmitted components of each contact.
-        starts: Where the components of each contact begin in the arrays below, (m + 1,).
+        starts: First position of each contact's components in the (k,) arrays below, (m + 1,).
         flat: Positions of all transmitted components in flattened (m, 6) wrenches, (k,).
         scale: Their scales, as in :attr:`Contact.scale`, (k,).
-        reciprocal: Their reciprocals, zero where nothing is transmitted, (m, 6).
-        friction: The same for the tangential components alone, (m, 6).
+        reciprocal: 1 / scale; zero for components that are not transmitted, (m, 6).
+        transmitted: 1 for transmitted components, else 0, (m, 6).
+        friction: 1 / scale of the tangential components; zero for all others, (m, 6).
         f_n_min, f_n_max: Bounds of the normal forces [N], (m,).
         bounds: Right-hand sides of -f_n <= -f_n_min and f_n <= f_n_max [N], (2 m,).
         preload: The largest f_n_min [N].
         largest_bound: The largest finite bound [N].
-        structure: What two sets share whose problems differ in numbers only.
+        structure: Equal for two sets whose problems differ in numbers only.
 
     Raises:
         InvalidInputError: There are no contacts, or two of the same name.
@@ -132,14 +131,16 @@ class ContactSet:
         self.hands = tuple(i for i, c in enumerate(contacts) if c.role is Role.HAND)
         in_order = self.hands == tuple(range(len(self.hands)))
         self.hand_rows: slice | list[int] = slice(len(self.hands)) if in_order else list(self.hands)
+        self.rough = np.array([c.model.has_friction for c in contacts])
         self.widths = tuple(len(c.model.components) for c in contacts)
-        self.starts = np.cumsum([0, *self.widths])
+        self.starts: Indices = np.cumsum([0, *self.widths])
         self.flat = np.concatenate(
             [6 * i + np.array(c.model.components) for i, c in enumerate(contacts)]
         )
         self.scale = np.concatenate([c.scale for c in contacts])
         self.reciprocal = np.zeros((len(contacts), 6))
         self.reciprocal.flat[self.flat] = 1.0 / self.scale
+        self.transmitted = (self.reciprocal > 0.0).astype(float)
         self.friction = self.reciprocal.copy()
         self.friction[:, N] = 0.0
         self.f_n_min = np.array([c.f_n_min for c in contacts])
@@ -147,19 +148,19 @@ class ContactSet:
         self.preload = float(self.f_n_min.max())
         self.bounds = np.concatenate([-self.f_n_min, self.f_n_max])
         self.largest_bound = float(np.abs(self.bounds[np.isfinite(self.bounds)]).max())
-        # One string, for its hash is kept.
+        # One string, because Python keeps the hash of a string.
         self.structure = " ".join(
             f"{c.model}|{c.role}|{c.f_n_min > 0.0}|{math.isfinite(c.f_n_max)}" for c in contacts
         )
 
     @staticmethod
     def of(contacts: tuple[Contact, ...]) -> ContactSet:
-        """The set of a tuple: made once, for the contacts of a run are one tuple at every tick."""
+        """Return the set of a tuple; it is made once for the one tuple of contacts of a run."""
         return _contact_set(_Same(contacts))
 
 
 class _Same:
-    """A tuple as a key that is compared by identity: contacts are frozen, but slow to hash."""
+    """A key that compares a tuple by identity: contacts are frozen, but slow to hash."""
 
     __slots__ = ("contacts",)
 
@@ -179,7 +180,7 @@ def _contact_set(key: _Same) -> ContactSet:
 
 
 def check_names(field: str, names: tuple[str, ...]) -> None:
-    """Refuses an empty set of names, and names that occur more than once."""
+    """Raise InvalidInputError if there are no names, or if a name occurs more than once."""
     if not names:
         raise InvalidInputError(field, "an empty set", "at least one")
     if len(set(names)) < len(names):
@@ -195,12 +196,12 @@ _SKEW = np.array(
 
 
 def skew(p: Array) -> Array:
-    """Cross-product matrices S(p) of vectors p, (..., 3) -> (..., 3, 3), with S(p) z = p x z."""
+    """Return the cross-product matrices S(p), (..., 3, 3), of p, (..., 3): S(p) z = p x z."""
     return p.dot(_SKEW).reshape(*p.shape, 3)
 
 
 def grasp_maps(R_OC: Array, p_OC_O: Array) -> Array:
-    """Maps of contact wrenches to object wrenches, (8) and (9) of the paper.
+    """Return the maps of contact wrenches to object wrenches, (8) and (9) of the paper.
 
     Args:
         R_OC: Contact axes (t, o, n) in the object's axes, (m, 3, 3).
@@ -217,7 +218,7 @@ def grasp_maps(R_OC: Array, p_OC_O: Array) -> Array:
 
 
 def utilisation(contacts: tuple[Contact, ...], w_OC_C: Array) -> Array:
-    """Friction utilisation of each contact: 0 along the normal, 1 on the cone, above 1 outside.
+    """Return the friction utilisation of each contact: 0 on the normal, 1 on the cone's surface.
 
     Args:
         contacts: The m contacts.

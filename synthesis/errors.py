@@ -1,4 +1,4 @@
-"""The one error tree: every message names the culprit, what was given and what is valid."""
+"""The error tree: every message names the culprit, what was given and what is valid."""
 
 from __future__ import annotations
 
@@ -8,24 +8,22 @@ class FulcrumError(Exception):
 
 
 class InvalidInputError(FulcrumError, ValueError):
-    """A field of a problem, scenario or configuration is non-finite, mis-shaped or senseless."""
+    """A field of a problem, scenario or configuration has a value that is not valid."""
 
     def __init__(self, field: str, given: object, valid: str) -> None:
         self.field, self.given, self.valid = field, given, valid
-        super().__init__(f"{field}: got {_on_one_line(given)}; valid is {valid}.")
-
-
-def _on_one_line(given: object) -> str:
-    if isinstance(given, str):
-        return given if given.isprintable() else repr(given)
-    return " ".join(str(given).split())
+        if not isinstance(given, str):
+            given = " ".join(str(given).split())
+        elif not given.isprintable():
+            given = repr(given)
+        super().__init__(f"{field}: got {given}; valid is {valid}.")
 
 
 class UnboundedError(FulcrumError):
-    """No optimal solution exists: the objective improves as long as forces grow.
+    """There is no optimal solution: the objective improves as long as forces grow.
 
     Attributes:
-        limit: Value that the objective approaches without attaining it; None where it has none.
+        limit: Value that the objective approaches and never attains; None without such a value.
     """
 
     def __init__(self, objective: str, limit: float | None = None) -> None:
@@ -38,7 +36,7 @@ class UnboundedError(FulcrumError):
 
 
 class SolverError(FulcrumError):
-    """The solver stopped without a solution and without a certificate."""
+    """The solver stopped with neither a solution nor a certificate."""
 
     def __init__(self, status: str) -> None:
         self.status = status

@@ -1,44 +1,44 @@
 r"""The friction margin: the smallest largest utilisation :math:`\|f_t\| / f_n` of all contacts.
 
-An unloaded contact has none. Forces with utilisations up to s exist exactly if (17) with its cones
-shrunk to :math:`\|f_t\| \le s f_n` is feasible. The set S(s) of such forces grows with s, and the
-margin is the least s with S(s) not empty.
+An unloaded contact has no utilisation. Forces with utilisations up to s exist exactly if (17) with
+its cones shrunk to :math:`\|f_t\| \le s f_n` is feasible. The set S(s) of such forces grows with s,
+and the margin is the least s with S(s) not empty.
 
-It is found by Dinkelbach's method for the largest of several ratios (Crouzeix, Ferland, Schaible
-1985): at the utilisation :math:`s` of the last forces solve
+Dinkelbach's method for the largest of several ratios (Crouzeix, Ferland, Schaible 1985) finds it:
+at the utilisation :math:`s` of the last forces solve
 
 .. math:: \min \lambda \quad \text{s.t. (12), (15), (16), (7)},\quad
           \|f_{t,i}\| \le s f_{n,i} + \lambda d_i
 
 with :math:`d_i` the last normal forces, starting from :math:`s = d_i = 1` with
 :math:`\lambda \le 0`, which is feasible exactly if (17) is. A negative :math:`\lambda` gives
-forces with a smaller utilisation; none is left when :math:`\lambda = 0`. It converges
-superlinearly, in 4 to 8 solves. An unloaded contact has no utilisation; its :math:`d_i = 0`
-keeps it within the cone at s without letting it hold the others back.
+forces with a smaller utilisation; none is left when :math:`\lambda = 0`. The method converges
+superlinearly, in 4 to 8 solves. For an unloaded contact, :math:`d_i = 0` keeps it within the cone
+at s and does not limit the others.
 
-It can fail in two ways. Where hands and environment can squeeze the object without limit, at
-utilisations from :math:`s_\infty` on, :math:`\lambda` has no bound for :math:`s > s_\infty`. And it
-never unloads a contact, which may take a smaller s than any forces that load it. So its answer
-counts only if S is empty just below it. If not, s is bisected, with the smallest forces in S(s):
+The method can fail in two ways. Where hands and environment can squeeze the object without limit,
+at utilisations from :math:`s_\infty` on, :math:`\lambda` has no bound for :math:`s > s_\infty`. And
+it never unloads a contact, although without that contact s may be smaller. So its answer is
+accepted only if S is empty just below it. If not, s is bisected, with the smallest forces in S(s):
 
 .. math:: R(s) = \min_{F \in S(s)} \max_i f_{n,i}
 
-R falls with s. For :math:`s < s_\infty` the set S(s) is compact, for a sequence of growing forces
-in it would have a squeeze as its limit direction. So an infimum :math:`s^* < s_\infty` is always
-attained. At :math:`s^* = s_\infty` it is attained exactly if R(s) stays finite as s falls to it; if
-not, utilisations near it take forces that grow without limit, and there is no optimum.
+R falls with s. For :math:`s < s_\infty` the set S(s) is compact, because a sequence of growing
+forces in it would have a squeeze as its limit direction. So an infimum :math:`s^* < s_\infty` is
+always attained. At :math:`s^* = s_\infty` it is attained exactly if R(s) stays finite as s falls to
+it. If not, utilisations near it need forces that grow without limit, and there is no optimum.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from fulcrum.synthesis.arrays import Array, N
-from fulcrum.synthesis.contact import ContactModel, Role
+from fulcrum.synthesis.contact import Role
 from fulcrum.synthesis.errors import SolverError, UnboundedError
 from fulcrum.synthesis.problem import Objective, Problem
 from fulcrum.synthesis.solution import (
@@ -51,14 +51,14 @@ from fulcrum.synthesis.solution import (
 
 _TOLERANCE = 1e-9
 _SOLVES = 50
-# Normal forces below this fraction of the largest force count as none: their cones are noise.
+# Normal forces below this fraction of the largest force count as zero: their cones are noise.
 _LOADED = 1e-6
-# Dinkelbach's answer counts if no utilisation is smaller by this share and number [-].
+# Dinkelbach's answer is accepted if no utilisation is smaller by this share and number [-].
 _BELOW = 1e-6, 1e-7
-# Multipliers prove if their value is nearly zero, and from this share of preloads in it on: less
-# does not stand out of the solver's noise [-].
+# Multipliers are a proof if their value is at most the first and the preloads' share in it at least
+# the second; a smaller share is within the solver's noise [-].
 _GAP, _PRELOADED = 1e-7, 1e-2
-# Forces this many times the load count as without limit [-].
+# Forces of more than this many times the load count as unlimited [-].
 _FARTHEST = 1e4
 
 
@@ -78,13 +78,13 @@ def largest_margin(solve: Solve, problem: Problem) -> Solution:
     """Return forces whose largest utilisation is the smallest.
 
     Args:
-        solve: Solves a problem; for the friction margin with parameters, and lambda as the value.
-        problem: Its objective is the friction margin.
+        solve: Function that solves a problem with parameters, and returns lambda as the value.
+        problem: Problem whose objective is the friction margin.
 
     Raises:
         InfeasibleError: No forces satisfy the constraints.
         UnboundedError: The least utilisation is approached only as forces grow without limit.
-        SolverError: The solver gave neither.
+        SolverError: The solver found neither forces nor a proof.
     """
     search = _Search(solve, problem)
     try:
@@ -99,22 +99,21 @@ def largest_margin(solve: Solve, problem: Problem) -> Solution:
 
 
 def _proven(found: Solution) -> bool:
-    """Whether the multipliers at hand prove that S is empty below.
+    """Return whether the multipliers prove that S is empty below.
 
-    For smaller cones they stay stationary if each cone's part y_n of what is taken off goes to the
-    contact's preload. The Lagrangian, 0 at s, then rises by the sum of y_n f_n_min, while that of
-    y_n f_n is s.
+    For smaller cones they stay stationary if the reduction of each y_n is added to the multiplier
+    of the contact's preload. The Lagrangian, 0 at s, then rises by the sum of y_n f_n_min, while
+    the sum of y_n f_n is s.
     """
     if found.residuals.gap > _GAP:
         return False
     y_n = found.multipliers.cone[:, N]
-    preloads = np.array([contact.f_n_min for contact in found.problem.contacts])
-    return bool(y_n @ preloads > _PRELOADED * found.value)
+    return bool(y_n @ found.problem.contact_set.f_n_min > _PRELOADED * found.value)
 
 
 def _dinkelbach(solve: Solve, problem: Problem) -> Solution:
-    """Dinkelbach's method; every iterate is feasible, so that stopping early costs margin only."""
-    unit = problem.load or 1.0
+    """Apply Dinkelbach's method; every iterate is feasible, so stopping early only costs margin."""
+    unit = problem.unit
     best = last = solve(problem, AS_IT_STANDS)
     iterations, solve_s = last.iterations, last.solve_s
     s, loaded = _largest_utilisation(last, unit)
@@ -124,7 +123,7 @@ def _dinkelbach(solve: Solve, problem: Problem) -> Solution:
         slack = np.where(loaded, last.w_OC_C[:, N], 0.0)
         try:
             last = solve(problem, Parameters(s=s, d=slack))
-        except InfeasibleError:  # At s the cones are left by noise alone.
+        except InfeasibleError:  # At s forces leave the cones by noise only.
             break
         iterations += last.iterations
         solve_s += last.solve_s
@@ -142,28 +141,27 @@ def _dinkelbach(solve: Solve, problem: Problem) -> Solution:
 
 
 class _Search:
-    """The bisection for the least utilisation, and what it has found so far."""
+    """The bisection for the least utilisation, with its interval and best solution so far."""
 
     def __init__(self, solve: Solve, problem: Problem) -> None:
         self._solve, self._problem = solve, problem
         self._squeezed = _squeezed(problem)
-        self._unit = problem.load or 1.0
+        self._unit = problem.unit
         self._low, self._high = 0.0, 1.0
         self._best: Solution | None = None
         self._proof: Certificate | None = None
-        # Whether the utilisation just below takes forces that count as without limit.
+        # Whether the utilisation just below needs forces that count as unlimited.
         self._far = False
         self._iterations, self._solve_s = 0, 0.0
 
     def serves(self, s: float) -> bool:
-        """Whether forces with utilisations up to s exist; narrows the interval down to say so."""
+        """Return whether forces with utilisations up to s exist, and narrow the interval."""
         try:
             found = self._solve(shrink_cones(self._squeezed, s), AS_IT_STANDS)
-        except InfeasibleError as error:
-            self._low, self._proof, self._far = s, error.certificate, False
-            return False
-        except SolverError:
+        except (InfeasibleError, SolverError) as error:
             self._low, self._far = s, False
+            if isinstance(error, InfeasibleError):
+                self._proof = error.certificate
             return False
         self._iterations += found.iterations
         self._solve_s += found.solve_s
@@ -174,7 +172,11 @@ class _Search:
         return True
 
     def least(self, known: Solution | None) -> Solution:
-        """The forces with the least utilisation, if they are better than those known."""
+        """Return the forces with the least utilisation.
+
+        Args:
+            known: Solution of Dinkelbach's method, whose effort counts; None if it failed.
+        """
         if self._best is None and not self.serves(1.0):
             if self._proof is not None:
                 raise InfeasibleError(replace(self._proof, problem=self._problem))
@@ -197,20 +199,18 @@ class _Search:
         )
 
     def _multipliers(self) -> Multipliers:
-        """The proof that a smaller utilisation has no forces, scaled to the forces' work."""
+        """Return the proof that a smaller utilisation has no forces, scaled to the forces' work."""
         assert self._best is not None
         if self._proof is None:  # No forces have a utilisation below 0.
-            nothing = np.zeros(len(self._problem.contacts))
-            joints = np.zeros(self._best.tau.size)
-            cone = np.zeros((nothing.size, 6))
-            return Multipliers(np.zeros(6), cone, nothing, nothing, joints, joints, np.zeros(0))
+            m, l = len(self._problem.contacts), self._best.tau.size
+            sizes = (6, (m, 6), m, m, l, l, 0)
+            return Multipliers(*(np.zeros(size) for size in sizes))
         ray = self._proof.multipliers
-        work = float((ray.cone[:, N] * self._best.w_OC_C[:, N]).sum()) or 1.0
-        return Multipliers(**{f.name: getattr(ray, f.name) / work for f in fields(ray)})
+        return ray.over(float((ray.cone[:, N] * self._best.w_OC_C[:, N]).sum()) or 1.0)
 
 
 def _squeezed(problem: Problem) -> Problem:
-    """The problem whose optimum is the smallest largest normal force of all contacts."""
+    """Return the problem whose optimum is the smallest largest normal force of all contacts."""
     joints = problem.joints
     if joints is not None:
         J_C = np.zeros((len(problem.contacts), *joints.J_C.shape[1:]))
@@ -225,8 +225,8 @@ def _squeezed(problem: Problem) -> Problem:
 
 
 def _largest_utilisation(solution: Solution, unit: float) -> tuple[float, NDArray[np.bool_]]:
-    """The largest utilisation of the loaded contacts with friction, and which they are, (m,)."""
+    """Return the largest utilisation of loaded contacts with friction, and their mask, (m,)."""
     f_n = solution.w_OC_C[:, N]
     loaded = f_n > _LOADED * max(unit, f_n.max())
-    loaded &= [c.model is not ContactModel.FRICTIONLESS for c in solution.problem.contacts]
+    loaded &= solution.problem.contact_set.rough
     return float(solution.utilisation[loaded].max(initial=0.0)), loaded

@@ -1,4 +1,4 @@
-"""Solutions and infeasibility certificates that prove themselves, without the solver.
+"""Solutions and infeasibility certificates that compute their own proof, without the solver.
 
 With multipliers nu (equilibrium), y_i (cones), alpha and beta (normal force bounds), gamma- and
 gamma+ (torque limits), the Lagrangian of (17) is
@@ -26,8 +26,11 @@ from fulcrum.synthesis.markdown import number
 from fulcrum.synthesis.problem import Objective, Problem
 from fulcrum.synthesis.render import Marked, Page, page, table, to_markdown
 
-# How many joints and constraints a table names.
+# Number of joints or constraints in a table.
 _NAMED = 6
+# A utilisation of 0 (normal forces alone balance the object) would leave no cone.
+_SMALLEST_UTILISATION = 1e-9
+_AXES = ("force x", "force y", "force z", "moment x", "moment y", "moment z")
 _UNITS = {"normal-force": "N", "torque": "N·m"}
 
 
@@ -36,14 +39,14 @@ class Multipliers:
     """Lagrange multipliers by the names of their constraints.
 
     Attributes:
-        equilibrium: nu, (6,): change of the optimal objective per change of ``w_ext_B``, which is
+        equilibrium: nu, (6,): derivative of the optimal objective by ``w_ext_B``, which is
             ``w_ext_O`` unless the object frame is far from the contacts.
-        cone: y, (m, 6), on transmitted components: an element of the dual friction cone.
+        cone: y, (m, 6): an element of the dual friction cone, in transmitted components.
         f_n_min: alpha >= 0, (m,).
         f_n_max: beta >= 0, (m,).
         tau_min: gamma- >= 0, (l,).
         tau_max: gamma+ >= 0, (l,).
-        gradient: A subgradient of the objective in F_n, (n,), or in tau, (l,); empty for the
+        gradient: Subgradient of the objective in F_n, (n,), or in tau, (l,); empty for the
             friction margin and for a certificate.
     """
 
@@ -55,8 +58,12 @@ class Multipliers:
     tau_max: Array
     gradient: Array
 
+    def over(self, divisor: float) -> Multipliers:
+        """Return all multipliers divided by a number."""
+        return Multipliers(*(getattr(self, f.name) / divisor for f in fields(self)))
+
     def stationarity(self, problem: Problem) -> Array:
-        """Gradient of the Lagrangian in the wrenches, (m, 6), zero in untransmitted components."""
+        """Return the Lagrangian's gradient in the transmitted wrench components, (m, 6)."""
         residual = np.einsum("mkj,k->mj", problem.G, self.equilibrium) - self.cone
         residual[:, N] += self.f_n_max - self.f_n_min
         hands = list(problem.hands)
@@ -67,10 +74,10 @@ class Multipliers:
             residual[hands, N] += self.gradient
         if problem.joints is not None:
             residual[hands] += problem.joints.J_C @ torque
-        return residual * _transmitted(problem)
+        return residual * problem.contact_set.transmitted
 
     def value(self, problem: Problem) -> float:
-        """Value of the Lagrangian where it is stationary: the dual objective."""
+        """Return the dual objective: the Lagrangian's value where it is stationary."""
         value = self.equilibrium @ problem.w_ext_B
         for contact, alpha, beta in zip(problem.contacts, self.f_n_min, self.f_n_max, strict=True):
             value += alpha * contact.f_n_min - (beta * contact.f_n_max if beta else 0.0)
@@ -84,21 +91,16 @@ class Multipliers:
         return float(value)
 
     def cone_violation(self, problem: Problem) -> float:
-        """How far any multiplier lies outside its dual cone; 0 or less inside."""
-        worst = max(
-            (-float(v.min()) for v in self._nonnegative() if v.size),
-            default=0.0,
-        )
+        """Return the largest distance of a multiplier from its dual cone; 0 or less inside."""
+        nonnegative = (self.f_n_min, self.f_n_max, self.tau_min, self.tau_max)
+        worst = max((-float(v.min()) for v in nonnegative if v.size), default=0.0)
         for contact, y in zip(problem.contacts, self.cone, strict=True):
             scaled = y[list(contact.model.components)] * contact.scale
             worst = max(worst, float(np.linalg.norm(scaled[1:]) - scaled[0]))
         return worst
 
-    def _nonnegative(self) -> tuple[Array, ...]:
-        return self.f_n_min, self.f_n_max, self.tau_min, self.tau_max
-
     def weights(self, problem: Problem) -> dict[str, float]:
-        """Size of each constraint's multiplier by its name, each in its own dual unit."""
+        """Return the size of each constraint's multiplier, in its dual unit, by name."""
         weights = {
             f"equilibrium {axis}": abs(float(value))
             for axis, value in zip(_AXES, self.equilibrium, strict=True)
@@ -113,22 +115,14 @@ class Multipliers:
         return weights
 
 
-# A utilisation of 0 (normal forces alone balance the object) would leave no cone to speak of.
-_SMALLEST_UTILISATION = 1e-9
-
-_AXES = ("force x", "force y", "force z", "moment x", "moment y", "moment z")
-
-
-def _transmitted(problem: Problem) -> Array:
-    mask = np.zeros((len(problem.contacts), 6))
-    for i, contact in enumerate(problem.contacts):
-        mask[i, list(contact.model.components)] = 1.0
-    return mask
+def heaviest(weights: dict[str, float], count: int) -> list[str]:
+    """Return the names of the largest positive weights, heaviest first, at most `count`."""
+    return sorted((n for n in weights if weights[n] > 0.0), key=lambda n: -weights[n])[:count]
 
 
 @dataclass(frozen=True)
 class Residuals:
-    """How well a solution satisfies (17) and its optimality conditions, computed from the problem.
+    """Residuals of (17) and of its optimality conditions, computed from the problem.
 
     Attributes:
         primal: Largest violation of equilibrium [N, N·m], cones, bounds [N] and limits [N·m].
@@ -146,11 +140,12 @@ class Solution:
     """An optimal solution of (17).
 
     Attributes:
-        problem: What was solved; contacts, joints and limits keep their names through it.
+        problem: The problem that was solved, with the names of contacts and joints.
         value: Optimal objective [N, N·m or -].
         w_OC_C: Wrenches on the object in contact axes [N, N·m], (m, 6).
         tau: Joint torques [N·m or N], (l,); empty without joints.
-        unpack: Gives the multipliers; called once they are asked for, for a loop asks for none.
+        unpack: Function that returns the multipliers; called on first use, since a control loop
+            needs none.
         iterations: Interior-point iterations, summed over all solves.
         solve_s: Time inside the solver [s].
     """
@@ -165,59 +160,32 @@ class Solution:
 
     @cached_property
     def multipliers(self) -> Multipliers:
-        """The duals; for the friction margin those of its last parametric problem."""
+        """Return the multipliers; for the friction margin those of its last parametric problem."""
         return self.unpack()
 
     @cached_property
     def utilisation(self) -> Array:
-        """Friction utilisation of each contact [-], (m,)."""
+        """Return the friction utilisation of each contact [-], (m,)."""
         return utilisation(self.problem.contacts, self.w_OC_C)
 
     def wrench(self, contact: str) -> Array:
-        """Wrench on the object at the named contact, in its axes [N, N·m], (6,)."""
+        """Return the wrench on the object at a named contact, in its axes [N, N·m], (6,)."""
         return self.w_OC_C[[c.name for c in self.problem.contacts].index(contact)]
 
     @cached_property
     def residuals(self) -> Residuals:
-        """The proof: residuals of the constraints and of the optimality conditions."""
-        return Residuals(
-            primal=self._primal_residual(),
-            dual=self._dual_residual(),
-            gap=self._gap(),
-        )
-
-    def _primal_residual(self) -> float:
-        problem, f_n = self.problem, self.w_OC_C[:, N]
-        balance = np.einsum("mkj,mj->k", problem.G, self.w_OC_C) + problem.w_ext_B
-        worst = float(np.abs(balance).max())
-        worst = max(worst, float(np.abs(self.w_OC_C * (1.0 - _transmitted(problem))).max()))
-        for contact, w in zip(problem.contacts, self.w_OC_C, strict=True):
-            tangential = w[list(contact.model.components[1:])] / contact.scale[1:]
-            worst = max(worst, float(np.linalg.norm(tangential)) - w[N])
-        worst = max(worst, *(c.f_n_min - f for c, f in zip(problem.contacts, f_n, strict=True)))
-        worst = max(worst, *(f - c.f_n_max for c, f in zip(problem.contacts, f_n, strict=True)))
-        if problem.joints is not None:
-            worst = max(worst, float((self.tau - problem.joints.tau_max).max()))
-            worst = max(worst, float((problem.joints.tau_min - self.tau).max()))
-            worst = max(worst, float(np.abs(self.tau - problem.torque(self.w_OC_C)).max()))
-        return worst
-
-    def _parametric(self) -> Problem:
-        """The problem whose multipliers are held: for the friction margin, cones shrunk to it."""
-        if self.problem.objective is not Objective.FRICTION_MARGIN:
-            return self.problem
-        return shrink_cones(self.problem, max(self.value, _SMALLEST_UTILISATION))
-
-    def _dual_residual(self) -> float:
-        problem = self._parametric()
-        worst = float(np.abs(self.multipliers.stationarity(problem)).max())
-        return max(worst, self.multipliers.cone_violation(problem))
-
-    def _gap(self) -> float:
-        dual = self.multipliers.value(self._parametric())
-        if self.problem.objective is Objective.FRICTION_MARGIN:
-            return abs(dual)
-        return abs(self.value - dual)
+        """Return the residuals of the constraints and of the optimality conditions."""
+        problem, value = self.problem, self.value
+        if problem.objective is Objective.FRICTION_MARGIN:
+            # The multipliers are those of the problem with its cones shrunk to the margin.
+            problem, value = shrink_cones(problem, max(value, _SMALLEST_UTILISATION)), 0.0
+        dual = _dual_residual(problem, self.multipliers)
+        gap = abs(value - self.multipliers.value(problem))
+        primal = violation(self.problem, self.w_OC_C, self.tau)
+        if self.problem.joints is not None:
+            torque = self.problem.torque(self.w_OC_C)
+            primal = max(primal, float(np.abs(self.tau - torque).max()))
+        return Residuals(primal, dual, gap)
 
     def page(self) -> Page:
         """Return objective, forces, joints nearest to their limits and the proof as a page."""
@@ -241,7 +209,7 @@ class Solution:
         )
 
     def _joint_rows(self) -> list[tuple[str, str, str]]:
-        """The joints that use most of their torque limits."""
+        """Return the rows of the joints that use most of their torque limits."""
         joints, tau = self.problem.joints, self.tau
         if joints is None:
             return []
@@ -257,11 +225,11 @@ class Solution:
 
 @dataclass(frozen=True, eq=False)
 class Certificate:
-    """Proof that (17) has no feasible point: multipliers whose Lagrangian is always positive.
+    """A proof that (17) has no feasible point: multipliers whose Lagrangian is always positive.
 
     Attributes:
         problem: The infeasible problem.
-        multipliers: Scaled so that their value is 1.
+        multipliers: Multipliers, scaled to a value of 1.
     """
 
     problem: Problem
@@ -269,29 +237,27 @@ class Certificate:
 
     @cached_property
     def residual(self) -> float:
-        """Violation of stationarity and dual cones relative to a value of 1; proves if << 1."""
-        worst = float(np.abs(self.multipliers.stationarity(self.problem)).max())
-        return max(worst, self.multipliers.cone_violation(self.problem))
+        """Return the violation of stationarity and dual cones; a proof has << 1."""
+        return _dual_residual(self.problem, self.multipliers)
 
     @cached_property
     def value(self) -> float:
-        """Value of the Lagrangian; positive for a valid certificate."""
+        """Return the value of the Lagrangian; positive for a valid certificate."""
         return self.multipliers.value(self.problem)
 
     def proves(self, force_bound: float) -> bool:
-        """Whether no feasible forces exist with transmitted components up to a bound [N, N·m].
+        """Return whether no feasible forces have components up to a bound [N, N·m].
 
-        The Lagrangian of a feasible F is at most 0, but at least ``value - |residual| |F|_1``
-        less what multipliers outside their dual cones may add; both are covered by twice the sum.
+        The Lagrangian of a feasible F is at most 0, and at least ``value - |residual| |F|_1`` minus
+        the contribution of multipliers outside their dual cones. Twice the sum covers both.
         """
         components = sum(len(c.model.components) for c in self.problem.contacts)
         limits = 2 * (len(self.problem.contacts) + self.multipliers.tau_max.size)
         return self.value > 2.0 * self.residual * force_bound * (components + limits)
 
     def heaviest(self, count: int) -> list[str]:
-        """Names of the constraints with the largest multipliers, heaviest first."""
-        weights = self.multipliers.weights(self.problem)
-        return sorted((n for n in weights if weights[n] > 0.0), key=lambda n: -weights[n])[:count]
+        """Return the names of the constraints with the largest multipliers, heaviest first."""
+        return heaviest(self.multipliers.weights(self.problem), count)
 
     def page(self) -> Page:
         """Return the constraints that contradict each other, heaviest first, as a page."""
@@ -311,24 +277,47 @@ class Certificate:
 
 
 def certificate(problem: Problem, ray: Multipliers) -> Certificate:
-    """The certificate made of an unbounded ray of multipliers, scaled to a value of 1."""
+    """Return the certificate of an unbounded ray of multipliers, scaled to a value of 1."""
     ray = replace(ray, gradient=np.zeros(0))
-    value = abs(ray.value(problem)) or 1.0
-    scaled = {f.name: getattr(ray, f.name) / value for f in fields(ray)}
-    return Certificate(problem=problem, multipliers=Multipliers(**scaled))
+    return Certificate(problem, ray.over(abs(ray.value(problem)) or 1.0))
 
 
 def shrink_cones(problem: Problem, factor: float) -> Problem:
-    """The problem with every friction coefficient multiplied by a factor > 0 [-]."""
+    """Return the problem with every friction coefficient multiplied by a factor > 0 [-]."""
     contacts = tuple(
-        c if c.model is ContactModel.FRICTIONLESS else replace(c, mu=c.mu * factor)
-        for c in problem.contacts
+        replace(c, mu=c.mu * factor) if c.model.has_friction else c for c in problem.contacts
     )
     return replace(problem, contacts=contacts)
 
 
+def violation(problem: Problem, w_OC_C: Array, tau: Array) -> float:
+    """Return the largest violation of (5), (6), (7), (12) or (16) [N, N·m].
+
+    Args:
+        problem: The problem.
+        w_OC_C: Wrenches on the object in contact axes [N, N·m], (m, 6).
+        tau: Joint torques [N·m or N], (l,).
+    """
+    facts, f_n = problem.contact_set, w_OC_C[:, N]
+    violations = [
+        np.abs(problem.imbalance(w_OC_C)),
+        np.abs(w_OC_C * (1.0 - facts.transmitted)),
+        np.linalg.norm(w_OC_C * facts.friction, axis=1) - f_n,
+        facts.f_n_min - f_n,
+        f_n - facts.f_n_max,
+    ]
+    if problem.joints is not None:
+        violations += [tau - problem.joints.tau_max, problem.joints.tau_min - tau]
+    return max(float(values.max()) for values in violations)
+
+
+def _dual_residual(problem: Problem, multipliers: Multipliers) -> float:
+    worst = float(np.abs(multipliers.stationarity(problem)).max())
+    return max(worst, multipliers.cone_violation(problem))
+
+
 class InfeasibleError(FulcrumError):
-    """No contact forces satisfy all constraints of (17); carries the Farkas certificate."""
+    """No contact forces satisfy all constraints of (17); `certificate` is the Farkas proof."""
 
     def __init__(self, certificate: Certificate) -> None:
         self.certificate = certificate

@@ -1,44 +1,51 @@
-"""What the commands share: exit codes, the choice of a controller, progress, output files."""
+"""What the commands share: exit codes, options, errors, progress and output files."""
 
 from __future__ import annotations
 
 import contextlib
+import dataclasses
 import itertools
-import math
+import re
+import shlex
 from collections.abc import Iterator
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from datetime import datetime
-from enum import StrEnum
 from pathlib import Path
-from typing import TYPE_CHECKING, Protocol, TypeVar
+from typing import TYPE_CHECKING, Annotated, Protocol
 
 import tyro
 
+from fulcrum.synthesis import FulcrumError, InvalidInputError
+
 if TYPE_CHECKING:
     from fulcrum.sim.planning import Planning
-    from fulcrum.sim.plant import Engine
-    from fulcrum.sim.scenario import Control, Scenario
-
-Choice = TypeVar("Choice", bound=StrEnum)
+    from fulcrum.sim.scenario import Scenario
 
 PASSED, FAILED, BAD_INPUT, BUG, INTERRUPTED = 0, 1, 2, 70, 130
 
 # Where runs and sweeps without a folder of their own are kept.
 _LOGS = Path("logs")
+# Options that may be left out: their help says what holds then, and not "None".
+MaybeText = Annotated[str | None, tyro.conf.arg(metavar="STR", help_behavior_hint="")]
+MaybeNumber = Annotated[float | None, tyro.conf.arg(metavar="FLOAT", help_behavior_hint="")]
+MaybePath = Annotated[Path | None, tyro.conf.arg(metavar="PATH", help_behavior_hint="")]
+
+# What a function's error calls an argument: by its name alone, or as part of its settings.
+_ARGUMENT = re.compile(r"(?:effort\.|margins\.)?(\w+)")
 
 
 @dataclass(frozen=True)
 class Chosen:
-    """What every command on a scenario is told."""
+    """Options of every command on a scenario."""
 
-    scenario: tyro.conf.Positional[str]
-    """Name of a scenario (see `fulcrum list`), or a file ending in .toml (see `fulcrum new`)."""
+    scenario: Annotated[tyro.conf.Positional[str], tyro.conf.arg(metavar="SCENARIO")]
+    """Name of a scenario (see `fulcrum list`), or a scenario file (see `fulcrum new`)."""
 
     allow_path: tyro.conf.UseAppendAction[tuple[Path, ...]] = field(default=(), kw_only=True)
-    """Folder besides its own from which the file may have meshes and robots read."""
+    """Folder, besides its own, from which the scenario file may read meshes and robots."""
 
     def chosen(self) -> Scenario:
-        """The scenario.
+        """Return the scenario.
 
         Raises:
             InvalidInputError: There is none of that name, or the file is not valid.
@@ -48,125 +55,86 @@ class Chosen:
         return scenario(self.scenario, self.allow_path)
 
     def told(self, error: Exception) -> str:
-        """An error as a sentence, with the scenario's file, if it has one, and what may help."""
+        """Return an error as a sentence that names the option or the file, and what may help."""
         from fulcrum.scenarios.reading.file import SUFFIX, open_source
         from fulcrum.scenarios.reading.source import FileError
         from fulcrum.sim.motion import PathError
-        from fulcrum.synthesis import InvalidInputError
 
-        of_an_option = isinstance(error, InvalidInputError) and error.field.startswith("--")
-        named = isinstance(error, (FileError, OSError)) or of_an_option
-        if not self.scenario.endswith(SUFFIX) or named:
+        if isinstance(error, InvalidInputError) and not isinstance(error, FileError):
+            names = {option.name for option in dataclasses.fields(self)} - {"scenario"}
+            argument = _ARGUMENT.fullmatch(error.field)
+            if argument and argument[1] in names:
+                option = f"--{argument[1].replace('_', '-')}"
+                error = InvalidInputError(option, error.given, error.valid)
+            if error.field.startswith("--"):
+                return str(error)
+        if not self.scenario.endswith(SUFFIX) or isinstance(error, (FileError, OSError)):
             return str(error)
         if not isinstance(error, PathError):
             return f"{self.scenario}: {error}"
         line = open_source(Path(self.scenario)).line(("path",))
         return (
             f"{self.scenario}:{line}: path: {str(error).rstrip('.')}; "
-            f"`fulcrum place {self.scenario}` seeks places for object, robots and hands that can."
+            f"`fulcrum place {self.scenario}` searches for a placement that works."
         )
 
     @property
     def words(self) -> list[str]:
-        """How a command line names it."""
+        """How a command line names the scenario."""
         allowed = [("--allow-path", str(folder)) for folder in self.allow_path]
         return [self.scenario, *itertools.chain.from_iterable(allowed)]
 
-
-def chosen_control(scenario: Scenario, controller: str, objective: str | None) -> Control:
-    """The scenario's control of a name, with another objective if one is given.
-
-    Raises:
-        InvalidInputError: There is no such controller or objective.
-    """
-    from fulcrum.sim.scenario import controller as named
-    from fulcrum.synthesis import Objective
-
-    control = named(scenario.control, controller, "--controller")
-    if objective is None:
-        return control
-    return replace(control, objective=one_of(Objective, "--objective", objective))
+    def line(self, command: str, without: tuple[str, ...] = (), **instead: object) -> str:
+        """Return the command line of a command, without some options, or with other values."""
+        words = ["fulcrum", command, *self.words]
+        for option in dataclasses.fields(self):
+            given = instead.get(option.name, getattr(self, option.name))
+            for value in given if isinstance(given, tuple) else (given,):
+                # No comparison with False: 0 is a seed.
+                left_out = option.name in ("scenario", "allow_path", *without)
+                if not left_out and value not in (None, "") and value is not False:
+                    name = f"--{option.name.replace('_', '-')}"
+                    words += [name] if value is True else [name, str(value)]
+        return shlex.join(words)
 
 
-def one_of(kind: type[Choice], option: str, text: str) -> Choice:
-    """The member of an enumeration that an option names.
+@dataclass(frozen=True)
+class Planned(Chosen):
+    """Options of commands that may execute a planned tilt."""
 
-    Raises:
-        InvalidInputError: It names none.
-    """
-    from fulcrum.synthesis import InvalidInputError
+    plan: MaybeText = field(default=None, kw_only=True)
+    """Execute a tilt that is planned for least-time, least-effort or friction-margin."""
 
-    if text not in list(kind):
-        raise InvalidInputError(option, text, f"one of {', '.join(kind)}")
-    return kind(text)
+    stretch: float = field(default=1.0, kw_only=True)
+    """Factor on the planned duration."""
 
+    robust: bool = field(default=False, kw_only=True)
+    """Plan for as much of the uncertainty set of controller robust as one grip holds."""
 
-def chosen_engine(name: str) -> Engine:
-    """Return the engine that ``--engine`` names.
+    duration: MaybeNumber = field(default=None, kw_only=True)
+    """Duration of the tilt [s], or with --plan the longest one; by default the scenario's own."""
 
-    Raises:
-        InvalidInputError: It names none, or one that is not installed.
-    """
-    from fulcrum.sim.plant import Engine, check_installed
+    def planning(self, scene: Scenario) -> Planning | None:
+        """Return how the tilt is planned; None if it is not."""
+        from fulcrum.scenarios.functions import chosen_planning
 
-    engine = one_of(Engine, "--engine", name)
-    check_installed(engine)
-    return engine
+        return chosen_planning(scene, self.plan, self.stretch, self.duration, self.robust)
 
 
-def chosen_planning(
-    scenario: Scenario, plan: str | None, stretch: float, duration: float | None, robust: bool
-) -> Planning | None:
-    """How the tilt is planned; None if it is not.
-
-    Raises:
-        InvalidInputError: There is no such plan, or none to be stretched or made robust.
-    """
-    from fulcrum.synthesis import InvalidInputError
-
-    if plan is not None:
-        return asked_planning(scenario, "--plan", plan, stretch, duration, robust)
-    for option, given, default in (("--stretch", stretch, 1.0), ("--robust", robust, False)):
-        if given != default:
-            raise InvalidInputError(option, given, "given with --plan")
-    return None
-
-
-def asked_planning(
-    scenario: Scenario,
-    option: str,
-    objective: str,
-    stretch: float,
-    duration: float | None,
-    robust: bool,
-    points: int = 100,
-) -> Planning:
-    """A plan as it is asked for; with the scenario's own duration if the objective needs one.
-
-    Raises:
-        InvalidInputError: There is no such plan.
-    """
-    from fulcrum.sim.planning import Planning
-    from fulcrum.sim.scenario import tilting
-    from fulcrum.synthesis.path import PathObjective
-
-    kind = one_of(PathObjective, option, objective)
-    if duration is None:
-        own = sum(scenario.phases[i].duration_s for i in tilting(scenario.phases))
-        duration = own if kind.needs_duration else math.inf
-    return Planning(stretch, points, kind, duration, robust)
+class CommandLineError(FulcrumError):
+    """The command line names no command, or options that the command does not have."""
 
 
 class Move(Protocol):
-    """Moves a progress bar to what is done of a total; a note stands beside it."""
+    """Moves a progress bar."""
 
     def __call__(self, done: int, total: int, note: str = "") -> None:
-        """Moves it."""
+        """Show how much is done of a total, with a note beside the bar."""
 
 
 @contextlib.contextmanager
 def progress_bar(name: str) -> Iterator[Move]:
-    """A progress bar with time left, on stderr; yields the function that moves it."""
+    """Show a progress bar with the time left on stderr; yield the function that moves it."""
     from rich.console import Console
     from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
 
@@ -184,10 +152,8 @@ def progress_bar(name: str) -> Iterator[Move]:
 
 
 def check_json(path: Path | None) -> None:
-    """Raises InvalidInputError before the work is done if a JSON file could not be written."""
+    """Raise InvalidInputError, before the work is done, if a JSON file cannot be written."""
     if path is not None and (path.is_dir() or not path.parent.is_dir()):
-        from fulcrum.synthesis import InvalidInputError
-
         raise InvalidInputError("--json", str(path), "a file in a folder that exists")
 
 
@@ -195,7 +161,7 @@ def check_results_folder(out: Path | None) -> None:
     """Refuse, before the work is done, a folder that cannot take the results.
 
     Raises:
-        InvalidInputError: It is not empty, or cannot be a folder, or must not be written to.
+        InvalidInputError: It is not empty, cannot be a folder, or must not be written to.
     """
     from fulcrum.sim.run import check_new_folder
 
@@ -209,14 +175,13 @@ def results_folder(out: Path | None, name: str) -> Path:
     Raises:
         InvalidInputError: It is not empty, or cannot be made.
     """
-    from fulcrum.sim.run import check_new_folder, claim_folder
-    from fulcrum.synthesis import InvalidInputError
+    from fulcrum.sim.run import claim_folder
 
     folder = out or _LOGS / f"{name}-{datetime.now():%Y%m%d-%H%M%S}"
     try:
         if out is None:
             return claim_folder(folder)
-        check_new_folder("--out", folder)
+        check_results_folder(folder)
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         given = f"{folder} ({error.strerror})"

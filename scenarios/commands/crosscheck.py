@@ -3,71 +3,64 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from pathlib import Path
 from typing import TYPE_CHECKING
 
-from fulcrum.scenarios.commands.common import (
-    FAILED,
-    PASSED,
-    Chosen,
-    chosen_control,
-    progress_bar,
-    results_folder,
-)
+from fulcrum.scenarios.commands import common
 from fulcrum.scenarios.commands.terminal import show
+from fulcrum.synthesis.checks import whole
 from fulcrum.synthesis.render import Bullets, Marked, Page, page, table
 
 if TYPE_CHECKING:
     from fulcrum.sim.run import Crosscheck, Request
+    from fulcrum.sim.scenario import Scenario
     from fulcrum.sim.world import World
 
 
 @dataclass(frozen=True)
-class CrosscheckCommand(Chosen):
-    """Run a scenario in MuJoCo and in Drake, and at half the step; exit 1 where they disagree."""
+class CrosscheckCommand(common.Chosen):
+    """Run a scenario in MuJoCo and in Drake, and at half the time step; compare the runs."""
 
-    controller: str | None = None
-    """See `fulcrum list`; robust if left out."""
+    controller: str = "robust"
+    """Controller of all runs (see `fulcrum list`)."""
 
     preset: str = "lab"
-    """How far worlds may be from what is believed: nominal, lab, field or harsh."""
+    """How far simulated worlds may be off the model: nominal, lab, field or harsh."""
 
     episodes: int = 0
-    """Worlds drawn from the preset, besides the nominal one."""
+    """Number of worlds to draw from the preset, besides the nominal one."""
 
     seed: int = 0
-    """Of the first world; the next have the next."""
+    """Seed of the first world; the next ones have the next seeds."""
 
     static: bool = False
     """Compare the forces of MuJoCo's run with Pinocchio's hard contacts instead."""
 
-    out: Path | None = None
-    """New or empty folder for the figures; logs/crosscheck-SCENARIO-TIME if left out."""
+    out: common.MaybePath = None
+    """New or empty folder for the figures; by default logs/crosscheck-SCENARIO-TIME."""
 
     def execute(self) -> int:
-        """Do it; return the exit code."""
+        """Run the command; return the exit code: 1 if the engines disagree."""
+        from fulcrum.scenarios.requests import chosen_control
         from fulcrum.sim.run import Request
         from fulcrum.sim.run.crosscheck import crosscheck
         from fulcrum.sim.run.crosscheck_picture import draw_crosscheck
-        from fulcrum.sim.scenario import default_controller
 
         chosen = self.chosen()
-        name = self.controller or default_controller(False)
-        control = chosen_control(chosen, name, None)
-        request = Request(chosen, name, control, best_effort=True)
+        control = chosen_control(chosen, self.controller)
+        request = Request(chosen, self.controller, control, best_effort=True)
         if self.static:
             return self._static(request)
-        out = results_folder(self.out, f"crosscheck-{chosen.name}")
-        out.mkdir(parents=True, exist_ok=True)
+        worlds = self._worlds(chosen)
+        out = common.results_folder(self.out, f"crosscheck-{chosen.name}")
         agrees = True
-        with progress_bar(chosen.name) as move:
-            checks = crosscheck(request, self._worlds(), progress=move)
-            for i, check in enumerate(checks):
+        with common.progress_bar(chosen.name) as move:
+            for i, check in enumerate(crosscheck(request, worlds, progress=move)):
                 show(_page(check))
-                draw_crosscheck(f"{chosen.name}, {name}", check, out / f"crosscheck-{i}.png")
+                title = f"{chosen.name}, {self.controller}"
+                draw_crosscheck(title, check, out / f"crosscheck-{i}.png")
                 agrees &= check.agrees
         show(page(f"Figures: {out}"))
-        return PASSED if agrees else FAILED
+        return common.PASSED if agrees else common.FAILED
 
     def _static(self, request: Request) -> int:
         from fulcrum.sim.analysis import static_differences
@@ -75,39 +68,34 @@ class CrosscheckCommand(Chosen):
         from fulcrum.sim.run.execute import execute
 
         result = execute(request)
-        found = static_differences(request.scenario, result.trace, result.history)
         rows, agrees = [], True
+        found = static_differences(request.scenario, result.trace, result.history)
         for name, off in found.items():
             share = off.normal_rms_n / off.peak_n if off.peak_n > 0.0 else 0.0
             agrees &= share <= Bounds().hand and off.solved == 1.0
-            figures = (off.normal_rms_n, 100 * share, off.tangential_rms_n)
-            rows.append(
-                (name, *(f"{x:.4f}" for x in figures), f"{100 * off.determined:.0f}"),
-            )
+            normal, tangential = f"{off.normal_rms_n:.4f}", f"{off.tangential_rms_n:.4f}"
+            determined = f"{100 * off.determined:.0f}"
+            rows.append((name, normal, f"{100 * share:.3f}", tangential, determined))
         head = ("contact", "normal [N]", "normal [% of peak]", "tangential [N]", "determined [%]")
-        title = f"{request.scenario.name}: Pinocchio's hard contacts minus MuJoCo's, RMS"
-        show(page(title, table(head, rows)))
-        return PASSED if agrees else FAILED
+        title = "RMS difference of hard contacts and MuJoCo, where the forces are determined"
+        show(page(f"{request.scenario.name}: {title}", table(head, rows)))
+        return common.PASSED if agrees else common.FAILED
 
-    def _worlds(self) -> dict[str, tuple[World, int]]:
-        """The nominal world and those drawn, with the seed of each, by what to call them."""
-        from fulcrum.scenarios.commands.sweep import drawn_world
+    def _worlds(self, chosen: Scenario) -> dict[str, tuple[World, int]]:
+        """Return the nominal world and those drawn, each with its seed, by name."""
+        from fulcrum.scenarios.requests import drawn_world
         from fulcrum.sim.world import NO_DEVIATION
-        from fulcrum.synthesis import InvalidInputError
 
-        for option in ("episodes", "seed"):
-            if getattr(self, option) < 0:
-                valid = "an integer >= 0"
-                raise InvalidInputError(f"--{option}", getattr(self, option), valid)
+        whole("--episodes", self.episodes, least=0)
+        whole("--seed", self.seed, least=0)
         worlds = {"nominal": (NO_DEVIATION, self.seed)}
         for seed in range(self.seed, self.seed + self.episodes):
-            label = f"{self.preset}, seed {seed}"
-            worlds[label] = drawn_world(self.chosen(), self.preset, seed, ""), seed
+            worlds[f"{self.preset}, seed {seed}"] = drawn_world(chosen, self.preset, seed, {}), seed
         return worlds
 
 
 def _page(check: Crosscheck) -> Page:
-    """How the variants of one world went, and how each contact differs from the reference."""
+    """Return the runs of one world, and how each contact differs from the reference, as a page."""
     runs = [
         (
             c.variant.name,

@@ -1,109 +1,96 @@
-"""The commands that ask why and how much: ``fulcrum explain`` and ``fulcrum capacity``."""
+"""`fulcrum explain` and `fulcrum capacity`: what limits a scenario, and by how much."""
 
 from __future__ import annotations
 
 import dataclasses
 import math
 from dataclasses import dataclass
-from pathlib import Path
 
-from fulcrum.scenarios.commands.common import (
-    FAILED,
-    INTERRUPTED,
-    PASSED,
-    Chosen,
-    check_json,
-    chosen_control,
-    progress_bar,
-)
+from fulcrum.scenarios.commands import common
 from fulcrum.scenarios.commands.terminal import show
-from fulcrum.synthesis.render import Page, page, table
+from fulcrum.synthesis.render import page, table
 
 # Shares of the capacity that `--confirm` runs: the first is to pass, the second to fail.
 _CONFIRMED_SHARES = (0.95, 1.05)
-# Steps of the tilt at which it is said how much uncertainty a grip bears [deg].
+# Steps of the tilt at which the uncertainty that a grip can hold is listed [deg].
 _BORNE_DEG = 15.0
 
 
 @dataclass(frozen=True)
-class ExplainCommand(Chosen):
-    """Say why a scenario's problem has no solution and what would help, or how much it bears."""
+class ExplainCommand(common.Chosen):
+    """Explain what limits a scenario at one tilt, by how much, and what to change."""
 
     controller: str = "margin"
-    """Whose margins count: robust, margin, paper or no-feedforward."""
+    """Controller whose margins count: robust, margin, paper or no-feedforward."""
 
-    tilt_deg: float | None = None
-    """Tilt [deg]; the first infeasible or else tightest one if left out."""
+    tilt_deg: common.MaybeNumber = None
+    """Tilt [deg]; by default the first one without forces, or else the one with least margin."""
 
-    objective: str | None = None
-    """What the synthesis minimises (see `fulcrum list`); the scenario's own if left out."""
+    objective: common.MaybeText = None
+    """What the synthesis minimises (see `fulcrum list`); by default the scenario's own."""
 
-    json: Path | None = None
-    """File for the result as JSON."""
+    json: common.MaybePath = None
+    """JSON file for the result."""
 
     def execute(self) -> int:
-        """Does it; returns the exit code: 0 feasible, 1 infeasible."""
-        from fulcrum.sim.analysis import tightest_tilt
-        from fulcrum.sim.analysis.explain import explain
-        from fulcrum.sim.planning import PathProblems, borne
+        """Run the command; return the exit code: 0 feasible, 1 infeasible."""
+        from fulcrum.scenarios import functions
+        from fulcrum.scenarios.requests import chosen_control
+        from fulcrum.sim.planning import borne
         from fulcrum.sim.run import write_json
-        from fulcrum.synthesis import Synthesizer
 
-        check_json(self.json)
+        common.check_json(self.json)
         chosen = self.chosen()
+        found = functions.explain(chosen, self.tilt_deg, self.controller, self.objective)
+        show(found.page(self.controller))
+        content = {"controller": self.controller, **dataclasses.asdict(found)}
         control = chosen_control(chosen, self.controller, self.objective)
-        problems, synthesizer = PathProblems(chosen, control), Synthesizer()
-        tilt = self.tilt_deg
-        if tilt is None:
-            tilt = tightest_tilt(problems, synthesizer)
-        explanation = explain(problems, tilt, synthesizer)
-        show(explanation.page(self.controller))
-        content = dataclasses.asdict(explanation)
-        if explanation.feasible and control.robustness is not None:
-            scalings = borne(chosen, control, _BORNE_DEG, problems.joint_path)
+        if found.feasible and control.robustness is not None:
+            scalings = borne(chosen, control, _BORNE_DEG)
             bears = {tilt: scaling.factor for tilt, scaling in scalings.items()}
-            show(_borne_page(bears))
+            rows = [(f"{tilt:g}", f"{100 * factor:.0f}") for tilt, factor in bears.items()]
+            show(page(table(("tilt [deg]", "uncertainty that one grip can hold [% of set]"), rows)))
             content["uncertainty_borne"] = bears
         if self.json is not None:
-            write_json(self.json, {"controller": self.controller, **content})
-        return PASSED if explanation.feasible else FAILED
+            write_json(self.json, content)
+        return common.PASSED if found.feasible else common.FAILED
 
 
 @dataclass(frozen=True)
-class CapacityCommand(Chosen):
-    """Find the heaviest object that the robot can pivot over the whole path, and can lift."""
+class CapacityCommand(common.Chosen):
+    """Find the heaviest object that the robots can pivot over the whole path, and can lift."""
 
     controller: str = "margin"
-    """Whose margins count: margin, paper or no-feedforward."""
+    """Controller whose margins count: margin, paper or no-feedforward."""
 
     confirm: bool = False
-    """Run the closed loop with 95 % and with 105 % of the capacity."""
+    """Run the closed loop with 95 % of the capacity (must pass) and 105 % (must fail)."""
 
-    json: Path | None = None
-    """File for the result as JSON."""
+    json: common.MaybePath = None
+    """JSON file for the result."""
 
     def execute(self) -> int:
-        """Does it; returns the exit code: 1 if a run does not confirm what was found."""
-        from fulcrum.sim.analysis import capacities
+        """Run the command; return the exit code: 1 if a run does not confirm the capacity."""
+        from fulcrum.scenarios import functions
+        from fulcrum.scenarios.requests import chosen_control
         from fulcrum.sim.evaluation import Verdict
         from fulcrum.sim.run import confirm, write_json
 
-        check_json(self.json)
+        common.check_json(self.json)
         chosen = self.chosen()
-        control = chosen_control(chosen, self.controller, None)
-        with progress_bar(chosen.name) as progress:
-            found = capacities(chosen, control, progress)
+        with common.progress_bar(chosen.name) as progress:
+            found = functions.capacity(chosen, self.controller, progress)
         for capacity in found:
             show(capacity.page())
         trials = []
-        # The scenario's own manoeuvre comes first.
-        own = found[0]
+        own = found[0]  # that of the scenario's own manoeuvre
         if self.confirm and 0.0 < own.weight < math.inf:
+            control = chosen_control(chosen, self.controller)
             for share in _CONFIRMED_SHARES:
-                with progress_bar(f"{100 * share:.0f} % of {own.weight:.4g} N") as progress:
+                with common.progress_bar(f"{100 * share:.0f} % of {own.weight:.4g} N") as progress:
                     trial = confirm(chosen, self.controller, control, own.weight, share, progress)
                 if trial.verdict is Verdict.INTERRUPTED:
-                    return INTERRUPTED
+                    return common.INTERRUPTED
                 trials.append(trial)
                 show(trial.page())
         if self.json is not None:
@@ -115,10 +102,4 @@ class CapacityCommand(Chosen):
             }
             write_json(self.json, content)
         confirmed = all((t.verdict is Verdict.PASS) is (t.share < 1.0) for t in trials)
-        return PASSED if confirmed else FAILED
-
-
-def _borne_page(bears: dict[float, float]) -> Page:
-    """The largest scaling of the controller's uncertainty set that one grip bears, by tilt."""
-    rows = [(f"{tilt:g}", f"{100 * factor:.0f}") for tilt, factor in bears.items()]
-    return page(table(("tilt [deg]", "uncertainty that one grip bears [% of the set]"), rows))
+        return common.PASSED if confirmed else common.FAILED

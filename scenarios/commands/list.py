@@ -4,27 +4,25 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from fulcrum.scenarios.commands.common import (
-    PASSED,
-)
+from fulcrum.scenarios.commands.common import PASSED
 from fulcrum.scenarios.commands.terminal import show
+from fulcrum.synthesis import Objective
 from fulcrum.synthesis.render import Lines, page, table
 
 
 @dataclass(frozen=True)
 class ListCommand:
-    """List the scenarios, and the controllers and objectives to run them with."""
+    """List the scenarios that ship, the controllers and the objectives."""
 
     def execute(self) -> int:
-        """Does it; returns the exit code."""
+        """Run the command; return the exit code."""
         from fulcrum.scenarios.reading.library import scenarios
         from fulcrum.sim.scenario import Control, controllers
-        from fulcrum.synthesis import Objective
 
         rows = [(scenario.name, scenario.summary) for scenario in scenarios().values()]
         names = (
             f"controllers: {', '.join(controllers(Control()))}",
             f"objectives:  {', '.join(Objective)}",
         )
-        show(page(table(("scenario", "what happens"), rows), Lines(names)))
+        show(page(table(("scenario", "description"), rows), Lines(names)))
         return PASSED

@@ -1,4 +1,4 @@
-"""Pages on a terminal."""
+"""Prints pages on a terminal."""
 
 from __future__ import annotations
 

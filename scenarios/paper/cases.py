@@ -23,10 +23,10 @@ PAPER_TILT_DEG = 85.0  # of the cylinder, where its figures end
 
 @dataclass(frozen=True, eq=False)
 class TiltCurve:
-    """Solutions of one problem family over the tilt, as far as it is feasible.
+    """Solutions of a problem over the tilt, where it is feasible.
 
     Attributes:
-        tilt_deg: (k,).
+        tilt_deg: Tilts [deg], (k,).
         normal: Normal forces of all contacts [N], (k, m).
         torque: Largest |torque| [N·m], (k,); zero without joints.
         solve_s: Wall time of each whole solve [s], (k,).
@@ -39,7 +39,7 @@ class TiltCurve:
 
 
 def tilt_curve(problems: PathProblems, tilts_deg: Iterable[float]) -> TiltCurve:
-    """Solves the problems at the tilts, leaving out the infeasible ones."""
+    """Solve the problems at the tilts; leave out infeasible ones."""
     synthesizer = Synthesizer()
     rows: list[tuple[float, Solution]] = []
     for tilt_deg in tilts_deg:
@@ -56,7 +56,7 @@ def tilt_curve(problems: PathProblems, tilts_deg: Iterable[float]) -> TiltCurve:
 
 
 def paper_cylinder() -> Scenario:
-    """The cylinder as the paper's figures need it: fingers at the very rim, tilted to 90 deg."""
+    """Return the paper's cylinder: fingers at the very rim, tilted to 90 deg."""
     tilted = scenario("cylinder-tilt")
     rim = -tilted.supports[0].p_OP_O[0]
     at_rim = tuple(replace(hand, p_OC_O=(rim, *hand.p_OC_O[1:])) for hand in tilted.hands)
@@ -65,7 +65,7 @@ def paper_cylinder() -> Scenario:
 
 
 def paper_box(up: float) -> Scenario:
-    """The box with its hand contacts at a height above the edge [m]."""
+    """Return the box with its hand contacts at a height above the edge [m]."""
     tilted = scenario("box-tilt")
     edge = tilted.supports[0].p_OP_O[2]
     hands = tuple(replace(hand, p_OC_O=(*hand.p_OC_O[:2], edge + up)) for hand in tilted.hands)

@@ -19,7 +19,7 @@ _CAPTION_WIDTH = 120
 
 @dataclass(frozen=True, eq=False)
 class Curve:
-    """A quantity over the tilt; style as matplotlib names it."""
+    """A quantity over the tilt, with its style in matplotlib."""
 
     name: str
     tilt_deg: Array
@@ -29,17 +29,17 @@ class Curve:
 
 @dataclass(frozen=True, eq=False)
 class Figure:
-    """Curves of one quantity over the tilt; ``name`` is that of the files."""
+    """Curves of one quantity over the tilt; ``name`` is the name of its files."""
 
     name: str
     title: str
     quantity: str
     caption: str
-    curves: tuple[Curve, ...]
+    curves: list[Curve]
 
 
 def draw(figure: Figure, folder: Path) -> None:
-    """Writes a figure as PNG, and its numbers as CSV with one row per point."""
+    """Write a figure as PNG, and its numbers as CSV with one row per point."""
     with (folder / f"{figure.name}.csv").open("w", newline="") as file:
         table = csv.writer(file)
         table.writerow(["curve", "tilt_deg", figure.quantity])

@@ -31,32 +31,33 @@ from fulcrum.synthesis.render import Line, Lines, Mark, Marked, Page, page
 
 Step = Callable[[str], None]
 STEPS = 7
+_FORCE = "normal force [N]"
 # The second objective of a kind often lies on the first: it is drawn dotted over it.
 _STYLES = {"GFOP max": "-", "GFOP norm": ":", "TOP max": "-", "TOP norm": ":"}
 
 
 @dataclass(frozen=True)
 class Reproduction:
-    """What came out.
+    """The paper's results beside ours.
 
     Attributes:
         statements: The paper's numbers beside ours.
-        grip_errors: By closed loop, of both hands: RMS of the measured minus the computed normal
-            force over the peak of the computed one [-].
+        grip_errors: RMS of the measured minus the computed normal force over the peak of the
+            computed one [-], of both hands, by closed loop.
     """
 
     statements: tuple[Statement, ...]
     grip_errors: dict[str, list[float]]
 
     def page(self) -> Page:
-        """Return every statement with both numbers and the reason, and the grips, as a page."""
+        """Return every statement with both numbers and the reason, and the grip errors."""
         lines: list[Line] = []
         for s in self.statements:
             numbers = (f": {s.statement}: ", Marked(s.paper), "; ours: ", Marked(s.ours))
             lines += [(_MARKS[s.reproduced], *numbers), f"    {s.reason}"]
         for name, errors in self.grip_errors.items():
             percent = " and ".join(f"{100 * error:.2f} %" for error in errors)
-            lines.append(f"closed loop, {name}: measured grip within {percent} RMS of the computed")
+            lines.append(f"closed loop, {name}: RMS error of the grip {percent} of its peak")
         return page(Lines(tuple(lines)))
 
 
@@ -68,11 +69,11 @@ _MARKS = {
 
 
 def reproduce(out: Path, step: Step) -> Reproduction:
-    """Computes, runs, draws and compares; writes figures (PNG, CSV) and ``paper.json``.
+    """Compute, run, draw and compare; write figures (PNG, CSV) and ``paper.json``.
 
     Args:
-        out: Folder to write.
-        step: Called with a line of words at the start of every step.
+        out: Folder of the results.
+        step: Called with a description at the start of every step.
     """
     box, cylinder = scenario("box-tilt"), paper_cylinder()
     exact_box, exact_cylinder = (controllers(s.control)["paper"] for s in (box, cylinder))
@@ -115,14 +116,19 @@ def reproduce(out: Path, step: Step) -> Reproduction:
 
 @dataclass(frozen=True, eq=False)
 class Loop:
-    """What a closed loop measured over the tilt, and the same computed for the same problem."""
+    """Forces and torques over the tilt, measured in closed loop and computed for its problem."""
 
     measured: TiltCurve
     computed: TiltCurve
 
+    @property
+    def drawn(self) -> tuple[tuple[str, TiltCurve, str], ...]:
+        """What figures show of it: in words, the curve, and its style."""
+        return ("with margin", self.computed, "--"), ("closed loop", self.measured, ".")
+
 
 def closed_loop(chosen: Scenario, objective: Objective) -> Loop:
-    """Runs a scenario with its own control, and computes its problem at the same tilts."""
+    """Run a scenario with its own control, and compute its problem over the tilt."""
     control = replace(chosen.control, objective=objective)
     result = execute(Request(chosen, "margin", control))
     if result.report.verdict is Verdict.INTERRUPTED:
@@ -142,7 +148,7 @@ def closed_loop(chosen: Scenario, objective: Objective) -> Loop:
 
 
 def grip_error(loop: Loop, contact: int) -> float:
-    """RMS of measured minus computed normal force over the peak of the computed one [-]."""
+    """Return the RMS of measured minus computed normal force over the computed peak [-]."""
     expected = np.interp(
         loop.measured.tilt_deg, loop.computed.tilt_deg, loop.computed.normal[:, contact]
     )
@@ -150,27 +156,21 @@ def grip_error(loop: Loop, contact: int) -> float:
     return float(np.sqrt(np.mean(error**2)) / loop.computed.normal[:, contact].max())
 
 
-def _curves(found: dict[str, TiltCurve], contacts: dict[str, int]) -> list[Curve]:
-    return [
+def _curves(
+    found: dict[str, TiltCurve], loops: dict[str, Loop], contacts: dict[str, int]
+) -> list[Curve]:
+    """Return normal forces of contacts over the tilt: as the paper has them, and as measured."""
+    curves = [
         Curve(f"{name}, {contact}", s.tilt_deg, s.normal[:, index], _STYLES[name])
         for name, s in found.items()
         for contact, index in contacts.items()
     ]
-
-
-def _loop_curves(name: str, loop: Loop, contacts: dict[str, int]) -> list[Curve]:
-    curves = []
-    for contact, index in contacts.items():
-        computed, measured = loop.computed, loop.measured
-        curves += [
-            Curve(
-                f"{name} with margin, {contact}", computed.tilt_deg, computed.normal[:, index], "--"
-            ),
-            Curve(
-                f"{name} closed loop, {contact}", measured.tilt_deg, measured.normal[:, index], "."
-            ),
-        ]
-    return curves
+    return curves + [
+        Curve(f"{name} {kind}, {contact}", s.tilt_deg, s.normal[:, index], style)
+        for name, loop in loops.items()
+        for contact, index in contacts.items()
+        for kind, s, style in loop.drawn
+    ]
 
 
 def _margins(chosen: Scenario) -> str:
@@ -186,23 +186,13 @@ def _cylinder_figures(found: dict[str, TiltCurve], loop: Loop) -> list[Figure]:
         "most 30 N, fingers at the rim of the upper wall. With margin and in closed loop: fingers "
         f"{depth:.2g} m inside, {_margins(tilted)}."
     )
-    fingers = {"f_n1 (outer)": 0, "f_n2 (inner)": 1}
-    rim = {"f_En": 2}
+    drawn = {
+        "a": ("Finger forces", {"f_n1 (outer)": 0, "f_n2 (inner)": 1}),
+        "b": ("Environment force", {"f_En": 2}),
+    }
     return [
-        Figure(
-            "figure-5a",
-            "Finger forces",
-            "normal force [N]",
-            caption,
-            tuple(_curves(found, fingers) + _loop_curves("GFOP", loop, fingers)),
-        ),
-        Figure(
-            "figure-5b",
-            "Environment force",
-            "normal force [N]",
-            caption,
-            tuple(_curves(found, rim) + _loop_curves("GFOP", loop, rim)),
-        ),
+        Figure(f"figure-5{letter}", title, _FORCE, caption, _curves(found, {"GFOP": loop}, which))
+        for letter, (title, which) in drawn.items()
     ]
 
 
@@ -220,20 +210,13 @@ def _box_figures(found: dict[str, TiltCurve], gfop: Loop, top: Loop) -> list[Fig
         ("7", "Environment forces", {"edge left": 2, "edge right": 3}),
     ):
         for letter, (kind, loop) in zip("ab", loops.items(), strict=True):
-            own = {name: found[name] for name in kinds[kind]}
-            curves = _curves(own, contacts) + _loop_curves(kind, loop, contacts)
-            title = f"{what}, {kind}"
-            figures.append(
-                Figure(
-                    f"figure-{number}{letter}", title, "normal force [N]", caption, tuple(curves)
-                )
-            )
+            curves = _curves({name: found[name] for name in kinds[kind]}, {kind: loop}, contacts)
+            name, title = f"figure-{number}{letter}", f"{what}, {kind}"
+            figures.append(Figure(name, title, _FORCE, caption, curves))
     torque = [Curve(name, s.tilt_deg, s.torque, _STYLES[name]) for name, s in found.items()]
-    for kind, loop in loops.items():
-        torque += [
-            Curve(f"{kind} with margin", loop.computed.tilt_deg, loop.computed.torque, "--"),
-            Curve(f"{kind} closed loop", loop.measured.tilt_deg, loop.measured.torque, "."),
-        ]
-    title = "Largest joint torque"
-    figures.append(Figure("figure-8", title, "|torque| [N m]", caption, tuple(torque)))
-    return figures
+    torque += [
+        Curve(f"{kind} {how}", s.tilt_deg, s.torque, style)
+        for kind, loop in loops.items()
+        for how, s, style in loop.drawn
+    ]
+    return [*figures, Figure("figure-8", "Largest joint torque", "|torque| [N m]", caption, torque)]

@@ -1,4 +1,4 @@
-"""Every number the paper states, ours, and why they agree or not."""
+"""Every number that the paper states, beside ours, and why they agree or differ."""
 
 from __future__ import annotations
 
@@ -19,11 +19,11 @@ class Statement:
     """A number or fact that the paper states, beside ours.
 
     Attributes:
-        statement: What the paper says.
-        paper: Its figure.
-        ours: Ours.
-        reproduced: Whether they agree; None for what is only set side by side.
-        reason: Why, or why not, and what it takes.
+        statement: Statement of the paper.
+        paper: Number in the paper.
+        ours: Our number.
+        reproduced: Whether they agree; None for numbers that are only shown side by side.
+        reason: Why they agree or differ, and under which conditions they agree.
     """
 
     statement: str
@@ -56,12 +56,12 @@ def _feasible(chosen: Scenario, tilt_deg: float, with_joints: bool = False) -> b
 
 
 def all_statements(box: dict[str, TiltCurve], cylinder: dict[str, TiltCurve]) -> list[Statement]:
-    """What the paper states, in its order, given the curves of its figures."""
+    """Return the paper's statements in its order, given the curves of its figures."""
     return [*_cylinder_statements(cylinder), *_box_statements(box), *_speed(box, cylinder)]
 
 
 def _box_statements(curves: dict[str, TiltCurve]) -> list[Statement]:
-    """What section V.B says of the box."""
+    """Return the statements of section V.B on the box."""
     exact, center = _value(paper_box(0.055), 0.0), _value(paper_box(0.05), 0.0)
     gfop, top = curves["GFOP max"], curves["TOP max"]
     least = gfop.tilt_deg[np.argmin(gfop.normal[:, 0])]
@@ -124,25 +124,16 @@ def _box_statements(curves: dict[str, TiltCurve]) -> list[Statement]:
             worst[-2:] in ("e0", "e1"),
             "it depends on the arms' posture, which the paper does not state",
         ),
-        Statement(
-            "variables of the box, GFOP",
-            "14",
-            str(_variables(paper_box(0.05))),
-            _variables(paper_box(0.05)) == 14,
-            "two soft fingers of 4, two points of 3; ours has the torques eliminated in both",
-        ),
-        Statement(
-            "variables of the box, TOP",
-            "28",
-            str(_variables(paper_box(0.05), True)),
-            _variables(paper_box(0.05), True) == 28,
-            "and 14 joint torques, in the reference formulation",
-        ),
+        _size("box, GFOP", 14, paper_box(0.05), False, "two soft fingers of 4, two points of 3"),
+        _size("box, TOP", 28, paper_box(0.05), True, "and 14 joint torques"),
     ]
 
 
-def _variables(chosen: Scenario, with_joints: bool = False) -> int:
-    return solve_reference(_problem(chosen, 0.0, with_joints)).variables
+def _size(what: str, paper: int, chosen: Scenario, with_joints: bool, why: str) -> Statement:
+    """Return the number of variables in the reference formulation, beside the paper's."""
+    ours = solve_reference(_problem(chosen, 0.0, with_joints)).variables
+    reason = f"{why}; the problem that is solved in the loop has the torques eliminated"
+    return Statement(f"variables of the {what}", f"{paper}", f"{ours}", ours == paper, reason)
 
 
 def _largest_torque_joint(chosen: Scenario, tilt_deg: float) -> str:
@@ -153,7 +144,7 @@ def _largest_torque_joint(chosen: Scenario, tilt_deg: float) -> str:
 
 
 def _paper_lift(lift: Scenario) -> Scenario:
-    """What gives 52.97 N: mu 0.2, and hands level with, but 0.175 m from the centre of mass."""
+    """Return the lift that takes 52.97 N: mu 0.2, hands level with and 0.175 m from the centre."""
     hands = tuple(
         replace(hand, p_OC_O=(0.175, hand.p_OC_O[1], 0.0), friction=Friction(mu=0.2, e_n=0.5))
         for hand in lift.hands
@@ -162,7 +153,7 @@ def _paper_lift(lift: Scenario) -> Scenario:
 
 
 def _cylinder_statements(curves: dict[str, TiltCurve]) -> list[Statement]:
-    """What section V.A says of the cylinder."""
+    """Return the statements of section V.A on the cylinder."""
     tilted = paper_cylinder()
     gfop = curves["GFOP max"]
     outer, inner = gfop.normal[:, 0], gfop.normal[:, 1]
@@ -205,18 +196,12 @@ def _cylinder_statements(curves: dict[str, TiltCurve]) -> list[Statement]:
             not _feasible(lift, 0.0),
             f"without the limit it takes {needed:.0f} N per finger",
         ),
-        Statement(
-            "variables of the cylinder, GFOP",
-            "11",
-            str(_variables(tilted)),
-            _variables(tilted) == 11,
-            "two soft fingers of 4, one point of 3",
-        ),
+        _size("cylinder, GFOP", 11, tilted, False, "two soft fingers of 4, one point of 3"),
     ]
 
 
 def _feasible_to(chosen: Scenario) -> float:
-    """Largest feasible tilt [deg], bisected above 85 deg."""
+    """Return the largest feasible tilt between 80 and 90 deg, by bisection [deg]."""
     low, high = 80.0, 90.0
     while high - low > 1e-3:
         middle = (low + high) / 2
@@ -225,7 +210,7 @@ def _feasible_to(chosen: Scenario) -> float:
 
 
 def _speed(box: dict[str, TiltCurve], cylinder: dict[str, TiltCurve]) -> list[Statement]:
-    """Solver times per pose, beside the paper's on a machine of its time."""
+    """Return solver times per pose, beside the paper's on a machine of its time."""
     rows = (
         ("cylinder, GFOP", "1.15 s", cylinder["GFOP max"]),
         ("box, GFOP", "2.23 s", box["GFOP max"]),

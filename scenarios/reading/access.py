@@ -1,4 +1,4 @@
-"""Files that a scenario file may have read, and where they may be."""
+"""Files that a scenario file names; raises FileError if they are missing or out of reach."""
 
 from __future__ import annotations
 
@@ -9,18 +9,14 @@ from fulcrum.scenarios.reading.source import KeyPath, Source, nearest
 
 
 class Access:
-    """Where a scenario file may read: its own folder, and what the command line allows."""
+    """The folders a scenario file may read from: its own, and those the command line allows."""
 
     def __init__(self, source: Source, allowed: tuple[Path, ...]) -> None:
         self._source, self._folder = source, source.file.absolute().parent
         self._allowed = tuple(folder.resolve() for folder in (self._folder, *allowed))
 
     def file(self, key: KeyPath, given: str, what: str) -> Path:
-        """The file that a key names, relative to the scenario file.
-
-        Raises:
-            FileError: It is elsewhere, or there is none.
-        """
+        """Return the file that a key names, relative to the scenario file."""
         path = Path(given)
         try:
             found = (self._folder / path).resolve()
@@ -37,11 +33,7 @@ class Access:
         return found
 
     def model(self, key: KeyPath, given: str, shipped: tuple[str, ...], what: str) -> str:
-        """A model that ships, by its name, or the path of the file that a key names.
-
-        Raises:
-            FileError: There is neither, or its package reaches beyond the folders allowed.
-        """
+        """Return a model that ships by its name, or the path of the file that a key names."""
         if given in shipped:
             return given
         if "." not in given and "/" not in given:
@@ -50,6 +42,6 @@ class Access:
         file = self.file(key, given, what)
         root = package_root(file)
         if not any(root.is_relative_to(folder) for folder in self._allowed):
-            valid = f"{what} whose package {root} is given with --allow-path, as it may read there"
+            valid = f"{what} whose package folder {root} is allowed with --allow-path"
             raise self._source.error(key, given, valid)
         return str(file)

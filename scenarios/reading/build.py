@@ -1,4 +1,4 @@
-"""From the models of a scenario file to the scenario's own dataclasses."""
+"""Makes the scenario of a file's tables; raises FileError where they do not fit together."""
 
 from __future__ import annotations
 
@@ -10,13 +10,7 @@ import numpy as np
 from fulcrum.assets import ROBOTS
 from fulcrum.scenarios.reading.access import Access
 from fulcrum.scenarios.reading.contacts import make_hand, make_support
-from fulcrum.scenarios.reading.object import (
-    Thing,
-    make_object,
-    make_surface,
-    make_thing,
-    material,
-)
+from fulcrum.scenarios.reading.object import Thing, make_object, make_surface, make_thing, material
 from fulcrum.scenarios.reading.places import direction, only_one, orientation, vector
 from fulcrum.scenarios.reading.source import KeyPath, Source
 from fulcrum.scenarios.schema.motion import (
@@ -46,11 +40,7 @@ from fulcrum.sim.scenario import (
 
 
 def build(source: Source, file: ScenarioFile, access: Access) -> Scenario:
-    """The scenario of a file, named as the file is.
-
-    Raises:
-        FileError: Something in it does not fit together.
-    """
+    """Return the scenario of a file, named as the file is."""
     thing = make_thing(source, file.object, access)
     geoms = {n: make_surface(source, n, table) for n, table in file.environment.items()}
     _check_names(source, file, thing)
@@ -79,14 +69,14 @@ def build(source: Source, file: ScenarioFile, access: Access) -> Scenario:
 
 
 def _check_names(source: Source, file: ScenarioFile, thing: Thing) -> None:
-    """Refuses names that stand for two things, and robots with the same prefix."""
+    """Refuse a name given twice, and robots with the same prefix."""
     for name in file.supports:
         if name in file.hands:
             raise source.error(("supports", name), name, "a name that no hand has")
     own = {thing.name, *(geom.name for geom in thing.shape.geoms(thing.name))}
     for name in file.environment:
         if name in own:
-            raise source.error(("environment", name), name, "a name that the object has not")
+            raise source.error(("environment", name), name, "a name that the object does not use")
     prefixes = [robot.prefix for robot in file.robots]
     for index, prefix in enumerate(prefixes):
         if prefix in prefixes[:index]:
@@ -95,7 +85,7 @@ def _check_names(source: Source, file: ScenarioFile, thing: Thing) -> None:
 
 
 def _rests(thing: Thing, file: ScenarioFile, supports: tuple[Support, ...]) -> tuple[Rest, ...]:
-    """Surfaces with friction on which no support stands."""
+    """Return the surfaces with friction that have no support."""
     taken = {support.surface for support in supports}
     return tuple(
         Rest(
@@ -119,7 +109,7 @@ def _robot(source: Source, index: int, table: RobotTable, access: Access) -> Rob
     ):
         for joint, value in values.items():
             if joint in posture:
-                raise source.error((*key, name, joint), value, "in one posture table alone")
+                raise source.error((*key, name, joint), value, "in only one posture table")
             posture[joint] = unit * value
     what = "a URDF or MJCF file"
     with source.at(key):

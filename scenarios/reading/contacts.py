@@ -1,4 +1,4 @@
-"""From a scenario file to the contacts: hands and supports, and whether they are on the surface."""
+"""Makes hands and supports of a file's tables; raises FileError where they are off the surface."""
 
 from __future__ import annotations
 
@@ -26,17 +26,13 @@ from fulcrum.sim.model import across
 from fulcrum.sim.scenario import PAD, SUPPORT, Hand, Support
 from fulcrum.synthesis.arrays import Array, Vector
 
-# How far from perpendicular a tangent may be typed in [-]: access are given to a micrometre, on
-# which the normal of a curved face depends. What is off by less than the second stays as it is.
+# How far a given tangent may be from perpendicular [-]: points are given to a micrometre, on which
+# the normal of a curved face depends. Below the second number a tangent is taken as it is.
 _ACROSS, _EXACT = 1e-3, 1e-12
 
 
 def make_hand(thing: Thing, name: str, table: HandTable, access: Access) -> Hand:
-    """A hand and where it holds the object.
-
-    Raises:
-        FileError: The contact is not on the surface, or inside out.
-    """
+    """Return a hand and where it holds the object."""
     key: KeyPath = ("hands", name)
     point, normal = _touched(thing, key, table)
     normal = _normal(thing.source, key, table.normal, normal)
@@ -57,7 +53,7 @@ def make_hand(thing: Thing, name: str, table: HandTable, access: Access) -> Hand
 
 
 def _touched(thing: Thing, key: KeyPath, table: HandTable) -> tuple[Vector, Vector]:
-    """Where a hand touches the object, and the inward normal there."""
+    """Return where a hand touches the object, and the inward normal there."""
     source, shape = thing.source, thing.shape
     only_one(source, key, {"face": table.face, "point_m": table.point_m})
     named = [("may_touch", face) for face in table.may_touch or []]
@@ -85,11 +81,7 @@ def make_support(
     surfaces: dict[str, SurfaceTable],
     geoms: dict[str, Geom],
 ) -> Support:
-    """A point of the object that stays on a surface.
-
-    Raises:
-        FileError: The point is not on both, or there is no such surface.
-    """
+    """Return a point of the object that stays on a surface."""
     key: KeyPath = ("supports", name)
     source, surface = thing.source, surfaces.get(table.surface)
     if surface is None:
@@ -145,7 +137,7 @@ def _check_near(
 
 
 def _normal(source: Source, key: KeyPath, given: list[float] | None, own: Vector) -> Vector:
-    """The normal that is given, if it points to the same side as the surface's own."""
+    """Return the given normal, which must point to the same side as the surface's own."""
     if given is None:
         return own
     normal = _direction(source, (*key, "normal"), given)
@@ -161,7 +153,7 @@ def _tangent(source: Source, key: KeyPath, given: list[float] | None, normal: Ve
     tangent = _direction(source, (*key, "tangent"), given)
     along = abs(np.dot(tangent, normal))
     if not along < _ACROSS:
-        valid = f"a direction across the normal {_shown(normal)}"
+        valid = f"a direction perpendicular to the normal {_shown(normal)}"
         raise source.error((*key, "tangent"), given, valid)
     if along < _EXACT:
         return tangent
@@ -169,7 +161,7 @@ def _tangent(source: Source, key: KeyPath, given: list[float] | None, normal: Ve
 
 
 def _direction(source: Source, key: KeyPath, values: list[float]) -> Vector:
-    """A direction, of length 1."""
+    """Return a direction of length 1."""
     length = math.hypot(*values)
     if not 1e-6 < length < 1e6:
         raise source.error(key, values, "a direction, such as [0, 0, 1]")

@@ -1,7 +1,6 @@
-"""Scenario files: TOML that says everything about a scenario, and its published schema.
+"""Reads scenario files: TOML with a published schema.
 
-A file can run no code, and reads no other files than those in its folder, or where the command line
-allows it.
+A file runs no code, and reads other files only in its folder and where the command line allows it.
 """
 
 from __future__ import annotations
@@ -11,7 +10,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any, TypeVar
 
-from pydantic import TypeAdapter, ValidationError
+from pydantic import ValidationError
 
 from fulcrum.scenarios.reading.access import Access
 from fulcrum.scenarios.reading.build import build
@@ -19,6 +18,7 @@ from fulcrum.scenarios.reading.places import vector
 from fulcrum.scenarios.reading.source import FileError, Source, explained, nearest
 from fulcrum.scenarios.schema.keys import FileTable
 from fulcrum.scenarios.schema.tables import LiftedFile, ScenarioFile
+from fulcrum.scenarios.schema.walk import json_schema
 from fulcrum.sim.scenario import HOLD, Pivot, Scenario, lifted, tilting
 from fulcrum.synthesis import InvalidInputError
 
@@ -26,17 +26,17 @@ SUFFIX = ".toml"
 SCENES = Path(__file__).resolve().parents[1] / "scenes"
 TEMPLATE = Path(__file__).resolve().parents[1] / "template.toml"
 SCHEMA = SCENES / "scenario.schema.json"
-# Longer ones are no scenario [bytes].
+# Longer files are no scenarios [bytes].
 _LONGEST = 2_000_000
 _TITLE = "fulcrum scenario"
 
 
 def read(file: Path, allowed: tuple[Path, ...] = ()) -> Scenario:
-    """The scenario of a file, named as the file is.
+    """Return the scenario of a file, named as the file is.
 
     Args:
-        file: The file.
-        allowed: Folders besides its own from which it may have other files read.
+        file: Scenario file.
+        allowed: Folders, besides its own, from which it may read other files.
 
     Raises:
         FileError: It is not valid; says where and why.
@@ -45,7 +45,7 @@ def read(file: Path, allowed: tuple[Path, ...] = ()) -> Scenario:
 
 
 def made(source: Source, allowed: tuple[Path, ...] = ()) -> Scenario:
-    """The scenario of a text, as :func:`read` of the file that it is for.
+    """Return the scenario of a text, as :func:`read` does of its file.
 
     Raises:
         FileError: It is not valid; says where and why.
@@ -56,10 +56,10 @@ def made(source: Source, allowed: tuple[Path, ...] = ()) -> Scenario:
 
 
 def open_source(file: Path) -> Source:
-    """The text of a file.
+    """Return the text of a file.
 
     Raises:
-        FileError: It cannot be read, or is no TOML.
+        FileError: It cannot be read, or is not TOML.
     """
     valid = f"a scenario file, like those that `fulcrum new` writes, with the ending {SUFFIX}"
     try:
@@ -71,7 +71,7 @@ def open_source(file: Path) -> Source:
     except ValueError as error:  # no UTF-8, or a name with a zero in it
         if isinstance(error, FileError):
             raise
-        raise FileError(file, None, "", "no UTF-8 text", valid) from None
+        raise FileError(file, None, "", "text that is not UTF-8", valid) from None
 
 
 Model = TypeVar("Model", bound=FileTable)
@@ -81,11 +81,11 @@ def _validated(source: Source, model: type[Model]) -> Model:
     try:
         return model.model_validate(source.data)
     except ValidationError as error:
-        raise explained(source, model, error) from None
+        raise explained(source, model.__name__, error) from None
 
 
 def _lifted(source: Source, table: LiftedFile, allowed: tuple[Path, ...]) -> Scenario:
-    """The other scenario without its environment contacts."""
+    """Return the other scenario without its supports."""
     key = ("lifted_from",)
     shipped = scene_files()
     if table.lifted_from in shipped:
@@ -95,7 +95,7 @@ def _lifted(source: Source, table: LiftedFile, allowed: tuple[Path, ...]) -> Sce
     else:
         raise source.error(key, f'"{table.lifted_from}"', valid_names(table.lifted_from))
     if "lifted_from" in open_source(other).data:
-        raise source.error(key, f'"{table.lifted_from}"', "a scenario that is not lifted itself")
+        raise source.error(key, f'"{table.lifted_from}"', "a scenario without lifted_from")
     scenario = lifted(read(other, allowed))
     path, phases = scenario.path, scenario.phases
     if not isinstance(path, Pivot):
@@ -113,12 +113,12 @@ def _lifted(source: Source, table: LiftedFile, allowed: tuple[Path, ...]) -> Sce
 
 
 def scene_files() -> dict[str, Path]:
-    """The files of the scenes that ship, by name."""
+    """Return the files of the scenes that ship, by name."""
     return {path.stem: path for path in sorted(SCENES.glob(f"*{SUFFIX}"))}
 
 
 def named_file(field: str, name: str) -> Path:
-    """The file of a scenario: of one that ships by its name, else by its path.
+    """Return the file of a scenario that ships by its name, or of another one by its path.
 
     Raises:
         InvalidInputError: It is neither; names the field in which it was given.
@@ -132,12 +132,12 @@ def named_file(field: str, name: str) -> Path:
 
 
 def valid_names(word: str) -> str:
-    """What a scenario may be called, where a word is none of it."""
+    """Return the valid names of scenarios, those like a word first."""
     return f"{nearest(word, list(scene_files()))}, or a file ending in {SUFFIX}"
 
 
 def bring_schema(folder: Path) -> None:
-    """Put the schema into a folder, where editors find it by its name alone.
+    """Copy the schema into a folder, where editors find it by its name alone.
 
     A file of that name that is no such schema stays as it is.
     """
@@ -149,8 +149,8 @@ def bring_schema(folder: Path) -> None:
 
 
 def schema() -> dict[str, Any]:
-    """The JSON Schema of scenario files."""
-    made = TypeAdapter(ScenarioFile | LiftedFile).json_schema()
+    """Return the JSON Schema of scenario files."""
+    made = json_schema()
     return {
         "$schema": "https://json-schema.org/draft/2020-12/schema",
         "title": _TITLE,
@@ -159,7 +159,7 @@ def schema() -> dict[str, Any]:
 
 
 def _named_infinities(value: Any) -> Any:
-    """The value with infinite defaults, which JSON does not know, as TOML spells them."""
+    """Return a value with infinite numbers, which JSON does not know, as TOML writes them."""
     if isinstance(value, dict):
         return {key: _named_infinities(item) for key, item in value.items()}
     return "inf" if value == math.inf else value

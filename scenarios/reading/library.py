@@ -1,4 +1,4 @@
-"""The scenarios that ship, and those of files, by name."""
+"""The scenarios that ship, by name, and scenarios from files."""
 
 from __future__ import annotations
 
@@ -12,16 +12,16 @@ from fulcrum.sim.scenario import Scenario
 
 @cache
 def scenarios() -> dict[str, Scenario]:
-    """All scenarios that ship, by name."""
+    """Return all scenarios that ship, by name."""
     return {name: read(file) for name, file in scene_files().items()}
 
 
 def scenario(name_or_file: str | Path, allowed: tuple[Path, ...] = ()) -> Scenario:
-    """The scenario that ships under a name, or that of a file, which is named as the file.
+    """Return the scenario that ships under a name, or the one of a file.
 
     Args:
-        name_or_file: Its name, or its file's, which ends in ``.toml``.
-        allowed: Folders besides its own from which a file may have others read.
+        name_or_file: Name of a scenario, or of a file that ends in ``.toml``.
+        allowed: Folders, besides its own, from which the file may read others.
 
     Raises:
         InvalidInputError: There is none of that name, or the file is not valid.

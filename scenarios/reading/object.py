@@ -1,4 +1,4 @@
-"""From a scenario file to the object and what stands fast around it."""
+"""Makes object and fixed surfaces of a file's tables; raises FileError where they are wrong."""
 
 from __future__ import annotations
 
@@ -22,13 +22,13 @@ _GRID = 0.05
 
 @dataclass(frozen=True)
 class Thing:
-    """The object as contacts and path see it.
+    """Shape and pose of the object, for contacts and path.
 
     Attributes:
-        source: The file.
-        name: The object's.
-        shape: Its shape.
-        start: Its pose at the start.
+        source: Scenario file.
+        name: Name of the object.
+        shape: Shape of the object.
+        start: Pose of the object at the start.
     """
 
     source: Source
@@ -42,11 +42,7 @@ class Thing:
         return self.shape.resting or self.name
 
     def corner(self, key: KeyPath, name: str) -> Vector:
-        """A corner in the object frame [m].
-
-        Raises:
-            FileError: The object has none.
-        """
+        """Return a corner in the object frame [m]."""
         if not isinstance(self.shape, Box):
             points = "point_m and axis" if "edge" in key else "a point_m"
             raise self.source.error(key, f'"{name}"', f"{points}, as only a box has corners")
@@ -54,11 +50,7 @@ class Thing:
 
 
 def make_thing(source: Source, table: AnyObject, access: Access) -> Thing:
-    """The object's shape and place.
-
-    Raises:
-        FileError: There is no such shape or orientation.
-    """
+    """Return the object's shape and pose."""
     start = Pose(vector(table.position_m), orientation(source, ("object",), table))
     with source.at(("object",)):
         return Thing(source, table.name, _shape(table, access), start)
@@ -74,11 +66,7 @@ def _shape(table: AnyObject, access: Access) -> Shape:
 
 
 def make_object(thing: Thing, table: AnyObject) -> Object:
-    """The object with its mass.
-
-    Raises:
-        FileError: Its mass is not given, or in several ways.
-    """
+    """Return the object with its mass."""
     key: KeyPath = ("object",)
     names = ("weight_n", "mass_kg", "density_kg_per_m3")
     only_one(thing.source, key, {name: getattr(table, name) for name in names})
@@ -100,11 +88,7 @@ def make_object(thing: Thing, table: AnyObject) -> Object:
 
 
 def make_surface(source: Source, name: str, surface: SurfaceTable) -> Geom:
-    """The geom of something that stands fast.
-
-    Raises:
-        FileError: Its kind has another number of lengths, or no front.
-    """
+    """Return the geom of a fixed surface."""
     key: KeyPath = ("environment", name)
     quaternion = orientation(source, key, surface)
     at, size = np.asarray(surface.position_m), surface.size_m
@@ -127,7 +111,7 @@ def make_surface(source: Source, name: str, surface: SurfaceTable) -> Geom:
 
 
 def front(surface: SurfaceTable) -> Vector:
-    """Outward normal of a surface's front, in its own axes."""
+    """Return the outward normal of a surface's front, in its own axes."""
     if surface.kind != "wall":
         return (0.0, 0.0, 1.0)
     facing = surface.facing or "-x"
@@ -138,11 +122,7 @@ def front(surface: SurfaceTable) -> Vector:
 def material(
     source: Source, key: KeyPath, table: ContactTable | None, usual: ContactMaterial
 ) -> ContactMaterial:
-    """Stiffness and damping of a contact; as usual where they are not given.
-
-    Raises:
-        FileError: The stiffness is given in two ways, or a ball in part.
-    """
+    """Return stiffness and damping of a contact; the usual ones where they are not given."""
     if table is None:
         return usual
     ball = {n: getattr(table, n) for n in ("youngs_modulus_pa", "radius_m", "load_n")}
@@ -165,6 +145,6 @@ def material(
 
 
 def colour(values: list[float]) -> tuple[float, float, float, float]:
-    """Red, green, blue, opacity."""
+    """Return red, green, blue and opacity."""
     r, g, b, a = values
     return (r, g, b, a)

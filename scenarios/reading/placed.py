@@ -1,4 +1,4 @@
-"""A scenario file with another placement: only what moved is changed, and comments stay."""
+"""Writes a placement into a scenario file: only what moved changes, and comments stay."""
 
 from __future__ import annotations
 
@@ -20,14 +20,14 @@ _DIGITS, _DIRECTION_DIGITS = 6, 9
 
 
 def placed(text: str, before: Scenario, after: Scenario, note: str, elsewhere: bool) -> str:
-    """The text of a scenario file after a placement.
+    """Return the text of a scenario file after a placement.
 
     Args:
-        text: The file as it is.
-        before: What it says.
-        after: The same scenario, placed otherwise.
-        note: A comment for its head.
-        elsewhere: Whether it goes to another folder, where the schema will be beside it.
+        text: Text of the file.
+        before: Scenario of the file.
+        after: The same scenario after the placement.
+        note: Comment for the head of the file.
+        elsewhere: Whether the file goes to another folder, with the schema beside it.
     """
     document = tomlkit.parse(text)
     for table, old, new in zip(document["robots"], before.robots, after.robots, strict=True):
@@ -46,7 +46,7 @@ def placed(text: str, before: Scenario, after: Scenario, note: str, elsewhere: b
 
 
 def _stand(table: Any, old: Robot, new: Robot) -> None:
-    """Writes where a robot stands, and its start posture."""
+    """Write where a robot stands, and its start posture."""
     if new.base.position != old.base.position:
         table["position_m"] = _numbers(new.base.position)
     if new.base.quaternion != old.base.quaternion:
@@ -63,7 +63,7 @@ def _stand(table: Any, old: Robot, new: Robot) -> None:
 
 
 def _hold(table: Any, shape: Shape, old: Hand, new: Hand) -> None:
-    """Writes where and how a hand holds the object."""
+    """Write where and how a hand holds the object."""
     if new.p_OC_O != old.p_OC_O:
         if "face" in table:
             face = shape.closest(new.p_OC_O).face
@@ -83,5 +83,5 @@ def _numbers(values: Any, digits: int = _DIGITS) -> list[float]:
 
 
 def beside(file: Path) -> Path:
-    """Where the placed file of a file goes if nothing is said."""
+    """Return the default name of the placed file of a file."""
     return file.with_stem(f"{file.stem}-placed")

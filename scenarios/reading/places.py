@@ -1,4 +1,4 @@
-"""Places in a scenario file: poses, corners, directions, and points of surfaces."""
+"""Poses, corners, directions and surface points of scenario files; raises FileError if wrong."""
 
 from __future__ import annotations
 
@@ -15,27 +15,27 @@ from fulcrum.sim.geometry.shapes import Box, Cylinder
 from fulcrum.sim.model import across
 from fulcrum.synthesis.arrays import Array, Vector
 
-# A contact that is farther off is not on the surface [m].
+# Largest distance from its surface at which a point counts as on it [m].
 ON_SURFACE = 1e-3
-# Directions nearer to z than this take x as their tangent [-].
+# Normals with a larger z component than this take x as their tangent [-].
 _STEEP = 0.9
 _ROUNDING = 1e-12
 
 
 def vector(values: Sequence[float] | Array) -> Vector:
-    """Three numbers, without negative zeros."""
+    """Return three numbers, without negative zeros."""
     x, y, z = (float(value) + 0.0 for value in values)
     return (x, y, z)
 
 
 def direction(values: Sequence[float] | Array) -> Vector:
-    """A direction of length 1, without what rounding left of components that are 0."""
+    """Return a direction of length 1 whose components are 0 instead of rounding errors."""
     x, y, z = (float(value) if abs(value) > _ROUNDING else 0.0 for value in values)
     return (x, y, z)
 
 
 def turn(rpy_deg: list[float] | None) -> Quaternion:
-    """Quaternion wxyz of roll, pitch and yaw about fixed axes [deg]."""
+    """Return the quaternion wxyz of roll, pitch and yaw about fixed axes [deg]."""
     if rpy_deg is None:
         return (1.0, 0.0, 0.0, 0.0)
     w, x, y, z = wxyz(Rotation.from_euler("xyz", rpy_deg, degrees=True))
@@ -43,11 +43,7 @@ def turn(rpy_deg: list[float] | None) -> Quaternion:
 
 
 def orientation(source: Source, key: KeyPath, given: Placed) -> Quaternion:
-    """The orientation that a table gives in one of two ways.
-
-    Raises:
-        FileError: It gives both.
-    """
+    """Return the orientation that a table gives in one of two ways."""
     if given.quaternion is None:
         return turn(given.rpy_deg)
     if given.rpy_deg is not None:
@@ -57,11 +53,7 @@ def orientation(source: Source, key: KeyPath, given: Placed) -> Quaternion:
 
 
 def only_one(source: Source, key: KeyPath, options: Mapping[str, object]) -> None:
-    """Checks that exactly one of several keys is given.
-
-    Raises:
-        FileError: None is, or several are.
-    """
+    """Check that exactly one of several keys is given."""
     given = [name for name, value in options.items() if value is not None]
     if len(given) != 1:
         key = (*key, given[1]) if given else key
@@ -70,7 +62,7 @@ def only_one(source: Source, key: KeyPath, options: Mapping[str, object]) -> Non
 
 
 def corner(size: Vector, name: str) -> Vector:
-    """The corner of a box of that size [m] with a name like "-x +y -z"."""
+    """Return the corner of a box of that size [m] with a name like "-x +y -z"."""
     signs = [name[name.index(axis) - 1] for axis in "xyz"]
     x, y, z = (
         length / 2 if sign == "+" else -length / 2 for sign, length in zip(signs, size, strict=True)
@@ -79,14 +71,14 @@ def corner(size: Vector, name: str) -> Vector:
 
 
 def usual_tangent(normal: Vector) -> Vector:
-    """A unit vector across a unit normal: z as far as it is across, or x where the normal is z."""
+    """Return the part of z, or of x where the normal is along z, across a unit normal."""
     steep = abs(normal[2]) >= _STEEP
     towards = np.array([1.0, 0.0, 0.0]) if steep else np.array([0.0, 0.0, 1.0])
     return direction(across(towards, np.asarray(normal)))
 
 
 def surface_normal(geom: Geom, front: Vector, p_W: Array) -> tuple[Array, Array]:
-    """The place on a fixed surface that a point is at, or should be, and its normal, outwards.
+    """Return the point of a fixed surface that is nearest to a point, and the outward normal.
 
     Args:
         geom: A plane, a box or a cylinder.

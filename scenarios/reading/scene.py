@@ -1,4 +1,4 @@
-"""What only the composed scene shows to be wrong with a scenario file."""
+"""Errors of a scenario file that only the composed scene shows."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ _ONE_OF = "one of "
 
 
 def check_scene(file: Path, scenario: Scenario) -> None:
-    """Composes the scene: only then it is known which joints and bodies the robots have.
+    """Compose the scene, which shows which joints and bodies the robots have.
 
     Raises:
         FileError: The file names what they do not have, or gives angles out of range.
@@ -33,7 +33,7 @@ def check_scene(file: Path, scenario: Scenario) -> None:
 
 
 def _scene_key(source: Source, scenario: Scenario, field: str, given: str) -> KeyPath:
-    """The key that a field of the scenario comes from, as far as it can be told."""
+    """Return the key that a field of the scenario comes from, as far as it is known."""
     if "lifted_from" in source.data:
         return ("lifted_from",)
     head, *rest = field.split(".")
@@ -68,7 +68,7 @@ _ROBOT_KEYS = {
 
 
 def _robot_key(source: Source, index: int, rest: list[str]) -> KeyPath:
-    """The key of what a robot is refused for: a field and perhaps a joint."""
+    """Return the key of a robot's field, and of a joint in it, if there is one."""
     table, key = source.data["robots"][index], ("robots", index)
     field, joint = rest
     names = [n for n in _ROBOT_KEYS.get(field, (field,)) if n in table]

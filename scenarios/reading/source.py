@@ -1,4 +1,4 @@
-"""What is wrong with a scenario file, as one sentence with file, line, key and the valid values."""
+"""Errors in a scenario file, as one sentence with file, line, key and the valid values."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
-from pydantic import BaseModel, ValidationError
+from pydantic import ValidationError
 
 from fulcrum.scenarios.schema.keys import CORNER, NAME, PREFIX
 from fulcrum.scenarios.schema.walk import table_at
@@ -18,11 +18,11 @@ from fulcrum.synthesis import InvalidInputError
 
 KeyPath = tuple[str | int, ...]
 
-# How alike two words are if one is a slip of the other [-].
+# Similarity of two words of which one may be a misspelling of the other [-].
 _ALIKE = 0.6
-# As many of many valid words are named.
+# Number of valid words that are named if there are many.
 _NAMED = 8
-# Kinds of values that TOML knows, as people call them.
+# Kinds of values in TOML, by pydantic's names of errors.
 _KINDS = {
     "float_type": "a number",
     "int_type": "an integer",
@@ -52,9 +52,9 @@ class FileError(InvalidInputError):
     """A scenario file is not valid.
 
     Attributes:
-        file: The file.
-        line: Where the culprit stands, counted from 1; None if nowhere.
-        key: Its path in the file.
+        file: Scenario file.
+        line: Line of the error, counted from 1; None if it is on no line.
+        key: Path of the key in the file.
     """
 
     def __init__(self, file: Path, line: int | None, key: str, given: object, valid: str) -> None:
@@ -64,14 +64,14 @@ class FileError(InvalidInputError):
 
 
 class Source:
-    """The text of a file, which says on which line a key stands.
+    """The text of a scenario file, which finds the line of a key.
 
     Attributes:
-        file: Where it was read.
-        data: What it says.
+        file: File of the text.
+        data: Content of the text.
 
     Raises:
-        FileError: It is no TOML.
+        FileError: The text is not TOML.
     """
 
     def __init__(self, file: Path, text: str) -> None:
@@ -89,12 +89,12 @@ class Source:
             raise FileError(file, None, "", "brackets too deep", "TOML") from None
 
     def error(self, key: KeyPath, given: object, valid: str) -> FileError:
-        """The error of a key, on the line of the nearest table that is there."""
+        """Return the error of a key, on its line or that of the nearest table around it."""
         return FileError(self.file, self.line(key), dotted(key), given, valid)
 
     @contextlib.contextmanager
     def at(self, key: KeyPath) -> Iterator[None]:
-        """Turns refusals of the dataclasses that are made inside into errors of the file."""
+        """Turn refusals of dataclasses that are made inside into errors of the file."""
         try:
             yield
         except FileError:
@@ -103,7 +103,7 @@ class Source:
             raise self.refused(key, error) from None
 
     def refused(self, key: KeyPath, error: InvalidInputError) -> FileError:
-        """The refusal of a dataclass that is made from the table at a key, as one of the file."""
+        """Return the refusal of a dataclass that the table at a key made, as one of the file."""
         name = error.field.rpartition(".")[2]
         table: Any = self.data
         for part in key:
@@ -113,7 +113,7 @@ class Source:
         return self.error(key, error.given, error.valid)
 
     def line(self, key: KeyPath) -> int | None:
-        """Where the statement begins that brings a key, or the table that it is missing from."""
+        """Return the line of the statement with a key, or of the table that lacks the key."""
         known = key
         while known and not _holds(self.data, known):
             known = known[:-1]
@@ -134,7 +134,7 @@ class Source:
         return start + len(list(blank)) + 1
 
     def _statement_end(self, lines: int) -> int:
-        """The largest number of lines, not above this, that are TOML by themselves."""
+        """Return the largest number of lines, at most this, that are TOML by themselves."""
         while lines > 0 and self._until(lines) is None:
             lines -= 1
         return lines
@@ -165,7 +165,7 @@ def _has(data: Any, part: str | int) -> bool:
 
 
 def dotted(key: KeyPath) -> str:
-    """A key as people write it: ``robots[0].posture_deg.left_s0``."""
+    """Return a key as people write it: ``robots[0].posture_deg.left_s0``."""
     text = ""
     for part in key:
         text += f"[{part}]" if isinstance(part, int) else f".{part}" if text else part
@@ -173,7 +173,7 @@ def dotted(key: KeyPath) -> str:
 
 
 def nearest(word: str, known: list[str]) -> str:
-    """What is valid in place of a word, of which it may be a slip: the likeliest come first."""
+    """Return the valid words as text, those first of which a word may be a misspelling."""
     alike = difflib.get_close_matches(word, known, n=_NAMED, cutoff=_ALIKE)
     others = [other for other in known if other not in alike]
     shown = [*alike, *others][: max(_NAMED, len(alike))] if len(known) > 2 * _NAMED else []
@@ -188,8 +188,8 @@ def nearest(word: str, known: list[str]) -> str:
     return f"one of {shown[0]}, {rest}" if rest else shown[0]
 
 
-def explained(source: Source, model: type[BaseModel], error: ValidationError) -> FileError:
-    """The first of all errors that pydantic found, as a sentence; the others are counted."""
+def explained(source: Source, kind: str, error: ValidationError) -> FileError:
+    """Return the first of pydantic's errors as a sentence, which counts the others."""
     found = []
     for details in error.errors(include_url=False):
         key = _key(source.data, details["loc"])
@@ -199,14 +199,14 @@ def explained(source: Source, model: type[BaseModel], error: ValidationError) ->
     _, _, key, details = found[0]
     if details["type"] == "value_error":
         return source.refused(key, details["ctx"]["error"])
-    given, valid = _sentence(model, details, key)
+    given, valid = _sentence(kind, details, key)
     if len(found) > 1:
-        valid += f" (and {len(found) - 1} more to mend)"
+        valid += f" (and {len(found) - 1} more errors)"
     return source.error(key, given, valid)
 
 
 def _key(data: Any, loc: tuple[str | int, ...]) -> KeyPath:
-    """The key of pydantic's location, which also names the members of unions."""
+    """Return the key of pydantic's location, which also names the members of unions."""
     key: list[str | int] = []
     for i, part in enumerate(loc):
         last = i == len(loc) - 1
@@ -220,13 +220,15 @@ def _key(data: Any, loc: tuple[str | int, ...]) -> KeyPath:
     return tuple(key)
 
 
-def _sentence(model: type[BaseModel], details: Any, key: KeyPath) -> tuple[object, str]:
-    """What was given, and what is valid."""
+def _sentence(file: str, details: Any, key: KeyPath) -> tuple[object, str]:
+    """Return what was given, and what is valid."""
     kind, given, context = details["type"], details["input"], details.get("ctx", {})
     if kind == "extra_forbidden":
-        return "a key that does not exist", nearest(str(key[-1]), keys_at(model, details["loc"]))
+        return "a key that does not exist", nearest(
+            str(key[-1]), list(table_at(file, details["loc"])["properties"])
+        )
     if kind == "missing":
-        return "nothing", _described(model, details["loc"])
+        return "nothing", _described(file, details["loc"])
     if kind == "string_type" and {"edge", "corner"} & set(details["loc"]):
         points = "point_m and axis" if "edge" in details["loc"] else "point_m"
         return _shown(given), f"{_FORMS[CORNER]}; points go into {points}, as those of meshes must"
@@ -259,17 +261,12 @@ def _shown(given: object) -> str:
     return text if len(text) <= 60 else f"{text[:57]}.."
 
 
-def keys_at(model: type[BaseModel], loc: tuple[str | int, ...]) -> list[str]:
-    """The keys that the table may have in which a location ends."""
-    return list(table_at(model, loc).model_fields)
-
-
-def _described(model: type[BaseModel], loc: tuple[str | int, ...]) -> str:
-    field = table_at(model, loc).model_fields[str(loc[-1])]
-    text = (field.description or "a value").rstrip(".").replace("\n", " ")
+def _described(file: str, loc: tuple[str | int, ...]) -> str:
+    key = table_at(file, loc)["properties"][loc[-1]]
+    text = key.get("description", "a value").rstrip(".").replace("\n", " ")
     return f"a value for this key ({_lower(text)})"
 
 
 def _lower(text: str) -> str:
-    """A sentence as part of another."""
+    """Return a sentence as part of another."""
     return text[:1].lower() + text[1:]

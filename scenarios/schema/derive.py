@@ -1,4 +1,4 @@
-"""Tables of the scenario file that are settings classes of the code: keys, ranges and docs of both.
+"""Makes tables of the scenario file from settings classes of the code: keys, ranges and docs.
 
 ``physics: FromTable[Physics]`` in a table says that the file has a table there with the keys of
 :class:`Physics`, and that reading it makes an instance of it.
@@ -42,14 +42,14 @@ _TABLES: dict[type, type[FileTable]] = {}
 
 
 def table_of(settings: type) -> type[FileTable]:
-    """The table of a settings class, as a model."""
+    """Return the table of a settings class, as a model."""
     if settings not in _TABLES:
         _TABLES[settings] = derived(settings.__name__, FileTable, settings)
     return _TABLES[settings]
 
 
 def derived(name: str, base: type[AnyTable], settings: type, **keys: Any) -> type[AnyTable]:
-    """A table with the keys of another one, some of its own, and those of a settings class."""
+    """Return a table with the keys of another one, of its own, and of a settings class."""
     keys |= keys_of(settings)
     return create_model(
         name,
@@ -61,7 +61,7 @@ def derived(name: str, base: type[AnyTable], settings: type, **keys: Any) -> typ
 
 
 def keys_of(settings: type) -> dict[str, Any]:
-    """Kinds and descriptions of the keys of a settings class."""
+    """Return kinds and descriptions of the keys of a settings class."""
     keys: dict[str, Any] = {}
     docs = _docs(settings)
     for field in dataclasses.fields(settings):
@@ -75,13 +75,13 @@ def keys_of(settings: type) -> dict[str, Any]:
 
 
 def same(settings: type, name: str) -> Any:
-    """Default and description of a key that stands for a field of a dataclass."""
+    """Return default and description of a key that stands for a field of a dataclass."""
     field = next(field for field in dataclasses.fields(settings) if field.name == name)
     return Field(**_default(field), description=_docs(settings)[name])
 
 
 def _default(field: dataclasses.Field[Any]) -> dict[str, Any]:
-    """The default of a field, as pydantic takes it; nothing for a field that has none."""
+    """Return the default of a field, as pydantic takes it; nothing for a field without one."""
     if isinstance(field.default, Settings):
         return {"default_factory": lambda: field.default}
     if field.default is dataclasses.MISSING:
@@ -90,7 +90,7 @@ def _default(field: dataclasses.Field[Any]) -> dict[str, Any]:
 
 
 def _key(settings: type, field: str) -> tuple[str | None, type[Settings] | None]:
-    """The key of a field, None if it has none; or the settings class with keys in its place."""
+    """Return the key of a field, if it has one, or the settings class with keys in its place."""
     annotation = hints(settings)[field]
     key = said(annotation, Key)
     inline = get_args(annotation)[0] if said(annotation, Inline) else None
@@ -98,7 +98,7 @@ def _key(settings: type, field: str) -> tuple[str | None, type[Settings] | None]
 
 
 def instance(settings: type[T], table: FileTable, **instead: Any) -> T:
-    """The instance of a settings class that a table stands for, with some fields set otherwise."""
+    """Return the instance of a settings class that a table means, with other values if given."""
     values: dict[str, Any] = {}
     for field in hints(settings):
         key, inline = _key(settings, field)
@@ -111,7 +111,7 @@ def instance(settings: type[T], table: FileTable, **instead: Any) -> T:
 
 
 def _in_file(annotation: Any) -> Any:
-    """What TOML has for a kind of value: lists for tuples, texts for enumerations, tables."""
+    """Return what TOML has for a kind of value: lists, texts and tables."""
     origin, arguments = get_origin(annotation), get_args(annotation)
     if origin is Annotated:
         unlimited = (Field(allow_inf_nan=True),) if Unlimited in arguments else ()
@@ -129,7 +129,7 @@ def _in_file(annotation: Any) -> Any:
 
 
 def _docs(settings: type) -> dict[str, str]:
-    """The texts below the fields of a class and of those that it is made of."""
+    """Return the texts below the fields of a class and of its base classes."""
     found: dict[str, str] = {}
     for base in filter(dataclasses.is_dataclass, reversed(settings.__mro__)):
         body = _classes(base.__module__)[base.__name__].body
@@ -142,6 +142,6 @@ def _docs(settings: type) -> dict[str, str]:
 
 @cache
 def _classes(module: str) -> dict[str, ast.ClassDef]:
-    """The classes of a module, as its source has them."""
+    """Return the classes of a module as they stand in its source."""
     tree = ast.parse(inspect.getsource(sys.modules[module]))
     return {node.name: node for node in tree.body if isinstance(node, ast.ClassDef)}

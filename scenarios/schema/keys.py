@@ -1,4 +1,4 @@
-"""What kinds of values the keys of a scenario file take; the models are made of them."""
+"""The kinds of values that keys of a scenario file take."""
 
 from __future__ import annotations
 
@@ -18,10 +18,10 @@ Vector3 = Annotated[list[float], Len(3, 3), Field(examples=[[0.0, 0.0, 0.0]])]
 # Directions need not be of length 1.
 Direction = Annotated[list[float], Len(3, 3), Field(examples=[[0.0, 0.0, 1.0]])]
 Quaternion4 = Annotated[list[float], Len(4, 4), Field(examples=[[1.0, 0.0, 0.0, 0.0]])]
-# Where on a face, along each of its two coordinates.
+# A place on a face, along each of its two coordinates.
 Place2 = Annotated[list[Share], Len(2, 2), Field(examples=[[0.5, 0.5]])]
 Size3 = Annotated[list[Positive], Len(3, 3), Field(examples=[[0.01, 0.01, 0.01]])]
-# What bodies, geoms and contacts are called in the simulation, in reports and in recordings.
+# Names of bodies, geoms and contacts in the simulation, in reports and in recordings.
 Name = Annotated[str, Field(pattern=NAME)]
 Corner = Annotated[str, Field(pattern=CORNER, examples=["-x +y -z"])]
 Colour = Annotated[list[Share], Len(4, 4)]
@@ -29,7 +29,7 @@ Face = Annotated[str, Field(max_length=20, examples=["+y"])]
 
 
 class FileTable(BaseModel):
-    """A table of the file: no other keys than these, no conversions, no infinite numbers."""
+    """A table of the file: no unknown keys, no conversions, no infinite numbers."""
 
     model_config = ConfigDict(
         extra="forbid",

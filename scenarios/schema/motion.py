@@ -16,18 +16,18 @@ _APPROACH, _TOUCH, _GRIP = REACH
 
 
 class RobotTable(Placed):
-    """A robot, its place and its start posture; joints that are not named there are locked."""
+    """A robot, its place and its start posture. Joints without a start position are locked."""
 
     model: Text
-    """A name that ships, or a URDF or MJCF file relative to this one."""
+    """Name of a robot that ships, or a URDF or MJCF file relative to this file."""
 
     prefix: Annotated[str, Field(pattern=PREFIX)] = same(Robot, "prefix")
 
     posture_deg: dict[str, float] = {}
-    """Start angles by joint [deg], without the prefix; inverse kinematics seeks from there."""
+    """Start angles by joint, without the prefix [deg]; inverse kinematics starts from them."""
 
     posture_rad: dict[str, float] = {}
-    """The same [rad]; a joint is in one of these tables."""
+    """Start angles [rad]; every joint is in only one of these tables."""
 
     posture_m: dict[str, float] = {}
     """Start positions of sliding joints [m]."""
@@ -35,7 +35,7 @@ class RobotTable(Placed):
     still: list[str] = same(Robot, "still")
 
     torque_limit_nm: dict[str, Positive] = {}
-    """Torque limits by joint [N m], where they are to be lower than the description says."""
+    """Torque limits by joint [N m], where they are lower than those of the model."""
 
     force_limit_n: dict[str, Positive] = {}
     """Force limits of sliding joints [N]."""
@@ -55,7 +55,7 @@ class TurnTable(FileTable):
     angle_deg: Angle = same(Pivot, "angle_deg")
 
     edge: Annotated[list[Corner], Len(2, 2)] | None = None
-    """Two corners of the box; it turns about the line from the first to the second, by the
+    """Two corners of the box, which turns about the line from the first to the second by the
     right-hand rule."""
 
     point_m: Vector3 | None = None
@@ -84,20 +84,20 @@ class ScrewTable(TurnTable):
 
 
 class PoseTable(Placed):
-    """A pose that the object passes."""
+    """A pose on the path of the object."""
 
     position_m: Vector3
     """Position in the world [m]."""
 
 
 class PosesTable(FileTable):
-    """Poses that the object passes, smoothly in between, from where it is at the start."""
+    """A smooth path through poses, from where the object is at the start."""
 
     kind: Literal["poses"]
     """tilt, screw or poses."""
 
     poses: Annotated[list[PoseTable], Len(1)]
-    """The poses after the start, each turned against the one before."""
+    """Poses after the start, each with another orientation than the one before."""
 
 
 def _kind(path: Any) -> Any:
@@ -116,24 +116,25 @@ After = Literal["leave", "hold"]
 
 
 class ManoeuvreTable(FileTable):
-    """Timing of the phases: approach, touch, grip, tilt, and what comes then."""
+    """Timing of the phases: approach, touch, grip, tilt, and what follows."""
 
     approach_s: Duration = _APPROACH.duration_s
-    """Duration in which the hands come near [s]."""
+    """Duration of the hands' approach [s]."""
 
     touch_s: Duration = _TOUCH.duration_s
-    """Duration of the last 5 mm to their contacts [s]: heavy links touch hard."""
+    """Duration of the last 5 mm before contact [s]: short ones make heavy links hit hard."""
 
     grip_s: Duration = _GRIP.duration_s
-    """Duration in which the grip builds up [s]."""
+    """Duration in which the grip force builds up [s]."""
 
     tilt_s: Duration = TILT[0].duration_s
     """Duration of the tilt [s]."""
 
     after: After = "hold"
-    """What comes after the tilt: hold holds the object, leave sets it down and withdraws."""
+    """What follows the tilt: hold keeps holding the object, leave releases it and withdraws
+    the hands."""
 
     standoff_m: Gap = same(Scenario, "standoff")
 
     phases: list[FromTable[Phase]] | None = None
-    """All phases one by one, instead of durations and after."""
+    """All phases one by one, instead of the durations and after."""

@@ -1,7 +1,7 @@
-"""The scenario file as models: what is in the scene and who tilts it, key by key.
+"""The scenario file as models: the scene, and what happens in it, key by key.
 
-What these docstrings say is what editors show, from the JSON Schema, and what `fulcrum new` writes
-as comments. Units stand in the names of the keys.
+Editors show these docstrings, from the JSON Schema, and `fulcrum new` writes them as comments. The
+names of keys contain the units.
 """
 
 from __future__ import annotations
@@ -34,10 +34,10 @@ from fulcrum.synthesis.settings import Positive, Text
 
 
 class ContactTable(FileTable):
-    """How a contact gives way: its stiffness, or that of a ball on a flat by Hertz at a load."""
+    """Compliance of a contact: a stiffness, or that of a ball on a plane (Hertz) at a load."""
 
     stiffness_n_per_m: Positive | None = None
-    """Normal force per depth [N/m]."""
+    """Normal force per penetration depth [N/m]."""
 
     youngs_modulus_pa: Positive | None = None
     """Young's modulus of a ball on something much harder [Pa], instead of a stiffness."""
@@ -46,23 +46,23 @@ class ContactTable(FileTable):
     """Radius of the ball [m]."""
 
     load_n: Positive | None = None
-    """Normal force at which its stiffness is taken [N]."""
+    """Normal force at which the stiffness is evaluated [N]."""
 
     poisson_ratio: Annotated[float, Field(strict=True, ge=0.0, le=0.5)] = 0.5
     """Poisson's ratio of the ball [-]; rubber has 0.5."""
 
     damping_s: Positive | None = None
-    """Damping over stiffness [s]: the time in which a contact opens that is let go."""
+    """Damping over stiffness [s]: the time constant with which a released contact opens."""
 
 
 class ObjectTable(Placed):
-    """The thing that is tilted. It needs exactly one of weight_n, mass_kg, density_kg_per_m3."""
+    """The object that is moved. Give exactly one of weight_n, mass_kg and density_kg_per_m3."""
 
     shape: str
     """box, cylinder, hollow-cylinder or mesh."""
 
     name: Name = "object"
-    """What it is called."""
+    """Name of the object."""
 
     weight_n: Positive | None = None
     """Weight [N], with 9.81 m/s^2."""
@@ -74,11 +74,11 @@ class ObjectTable(Placed):
     """Density [kg/m^3]; the mass follows from the shape's volume."""
 
     center_of_mass_m: Vector3 | None = None
-    """Centre of mass in the object's frame [m]; the shape's, if it is left out."""
+    """Centre of mass in the object's frame [m]; by default that of the shape."""
 
     inertia_kg_m2: Size3 | None = None
     """Principal moments of inertia about the centre of mass, along the object's axes [kg m^2];
-    those of the homogeneous shape, if they are left out."""
+    by default those of the homogeneous shape."""
 
     rgba: Colour = list(COLOR)
     """Colour and opacity."""
@@ -93,7 +93,7 @@ SHAPES: dict[str, type[Shape]] = {
 
 
 def _object_table(name: str, shape: type[Shape]) -> type[ObjectTable]:
-    """The table of an object with a shape: keys of any object, and those of the shape."""
+    """Return the table of an object with a shape: keys of any object, and those of the shape."""
     tag: Any = (Literal[name], Field(description=ObjectTable.model_fields["shape"].description))
     return derived(f"{shape.__name__}FileTable", ObjectTable, shape, shape=tag)
 
@@ -108,83 +108,83 @@ else:
 
 
 class SurfaceTable(Placed):
-    """Something that stands fast. The object may lie on it if its friction is given."""
+    """A fixed surface. The object may rest on it if its friction is given."""
 
     kind: Literal["floor", "table", "step", "post", "wall"]
-    """floor is a plane through position_m; table and step are boxes and post is a cylinder with
-    position_m in the middle of their top; wall is a box with it in the middle of its front."""
+    """floor: a plane through position_m; table, step: a box, and post: a cylinder, with position_m
+    in the middle of the top; wall: a box with position_m in the middle of its front."""
 
     size_m: Annotated[list[Positive], Len(2, 3)]
-    """Lengths along its x, y and z [m]; of a floor along x and y, as far as it is drawn; diameter
-    and height of a post."""
+    """Lengths along its x, y and z [m]; of a floor along x and y, as far as it is drawn; of a post
+    diameter and height."""
 
     facing: Literal["+x", "-x", "+y", "-y"] | None = None
-    """Where the front of a wall looks; -x if it is left out."""
+    """Direction that the front of a wall faces; by default -x."""
 
     friction: FromTable[Friction] | None = None
-    """Between it and the object. Without, the object must not touch it, if it is solid."""
+    """Friction between surface and object. Without it the object must not touch a solid surface."""
 
     contact: ContactTable | None = None
-    """How it and the object give way to each other; 4e5 N/m and 5 ms, if it is left out."""
+    """Compliance of the contact with the object; by default 4e5 N/m and 5 ms."""
 
     solid: bool = Geom.solid
-    """Whether the robots must keep clear of it, and the object too, if it has no friction."""
+    """Whether robots must keep clear of it, and the object, too, if there is no friction."""
 
     rgba: Colour = [0.75, 0.77, 0.80, 1.0]
     """Colour and opacity."""
 
 
 class HandTable(FileTable):
-    """A robot's hand, and where it holds the object: at a face, or at a point."""
+    """A hand of a robot, and where it touches the object: on a face, or at a point."""
 
     mount: Text
-    """The robot's body that carries it, with the robot's prefix."""
+    """Body of the robot that carries the hand, with the robot's prefix."""
 
     mount_position_m: Vector3 | None = None
-    """Where on that body it sits [m]; at its origin, if it is left out."""
+    """Position of the hand on that body [m]; by default its origin."""
 
     mount_rpy_deg: Vector3 | None = None
-    """How it is turned there: roll, pitch and yaw [deg]."""
+    """Orientation of the hand on that body: roll, pitch and yaw [deg]."""
 
     tip: Text = "palm_pad"
     """palm_pad, finger_tip, or an MJCF file with a body `pad`, a spherical geom `tip` and a site
     `tip_center`."""
 
     face: Face | None = None
-    """Face of the object that it touches: of a box +x, -x, +y, -y, +z, -z."""
+    """Face of the object that the hand touches; a box has +x, -x, +y, -y, +z and -z."""
 
     at: Place2 | None = None
-    """Where on the face, from 0 to 1 along each of its two directions; its middle, if left out."""
+    """Place on the face, from 0 to 1 along each of its two directions; by default the middle."""
 
     point_m: Vector3 | None = None
-    """Where it touches, in the object's frame [m], instead of face and at."""
+    """Contact point in the object's frame [m], instead of face and at."""
 
     normal: Direction | None = None
-    """Inward normal there, in the object's axes; that of the surface, if it is left out."""
+    """Normal into the object, in its axes; by default that of the surface."""
 
     tangent: Direction | None = None
-    """First tangent there, which is the x axis of the tip; z across the normal, if it is left out,
-    or x where the normal is along z."""
+    """First tangent, which is the x axis of the tip; by default z as far as it is perpendicular to
+    the normal, or x where the normal is along z."""
 
     may_touch: list[Face] | None = None
-    """Faces to which `fulcrum place` may move it; its own, if they are left out."""
+    """Faces to which `fulcrum place` may move the hand; by default its own."""
 
     friction: FromTable[Friction]
-    """Between tip and object."""
+    """Friction between tip and object."""
 
     contact: ContactTable | None = None
-    """How tip and object give way to each other; as a rubber ball of 30 mm and 2 MPa under 50 N, if
-    it is left out: 4e4 N/m and 2 ms."""
+    """Compliance of the contact with the object; by default that of a rubber ball of 30 mm and
+    2 MPa under 50 N: 4e4 N/m and 2 ms."""
 
     grip_limit_n: Positive | None = None
-    """Largest normal force [N]; none, if it is left out."""
+    """Largest normal force [N]; by default unlimited."""
 
 
 class SupportTable(FileTable):
-    """A point of the object, or a corner, that stays on a surface while the object tilts."""
+    """A point or corner of the object that stays on a surface while the object tilts."""
 
     surface: Name
-    """The surface that it stays on."""
+    """Name of that surface, in the environment."""
 
     corner: Corner | None = None
     """Corner of the box, like "-x +y -z"."""
@@ -193,35 +193,35 @@ class SupportTable(FileTable):
     """The point in the object's frame [m], instead of a corner."""
 
     normal: Direction | None = None
-    """Normal into the object, in world axes; that of the surface, if it is left out."""
+    """Normal into the object, in world axes; by default that of the surface."""
 
     tangent: Direction | None = None
-    """First tangent, in world axes; z across the normal, if it is left out, or x where the normal
-    is along z."""
+    """First tangent, in world axes; by default z as far as it is perpendicular to the normal, or x
+    where the normal is along z."""
 
 
 class ScenarioFile(FileTable):
-    """A scenario: what is tilted, on what, by whom, along which path, and what is success."""
+    """A scenario: object, environment, hands, robots, path, control, and what counts as success."""
 
     summary: Text = same(Scenario, "summary")
 
     object: AnyObject
-    """The thing that is tilted."""
+    """The object that is moved."""
 
     environment: dict[Name, SurfaceTable]
-    """What stands fast, by name."""
+    """Fixed surfaces, by name."""
 
     hands: Annotated[dict[Name, HandTable], Len(1)]
-    """The robots' hands, by name: they hold the object all the way."""
+    """Hands of the robots, by name; they hold the object along the whole path."""
 
     supports: dict[Name, SupportTable] = {}
-    """Points of the object that stay on the environment, by name."""
+    """Points of the object that stay on the environment, by name of the contact."""
 
     robots: Annotated[list[RobotTable], Len(1)]
     """The robots."""
 
     path: AnyPath
-    """How the object is to move."""
+    """Path of the object."""
 
     holdable: bool = same(Scenario, "holdable")
 
@@ -229,7 +229,7 @@ class ScenarioFile(FileTable):
     """Timing of the phases."""
 
     control: FromTable[Control] = Field(default_factory=Control)
-    """How forces are synthesised and followed."""
+    """Settings of the force synthesis and of the controller."""
 
     physics: FromTable[Physics] = Field(default_factory=Physics)
     """Settings of the contact solver."""
@@ -238,19 +238,19 @@ class ScenarioFile(FileTable):
     """What counts as success."""
 
     view: FromTable[View] = Field(default_factory=View)
-    """Where recordings look from."""
+    """Viewpoint of recordings."""
 
 
 class LiftedFile(FileTable):
-    """A scenario like another one, without the environment's help: the object is to come off."""
+    """Another scenario without its supports: the object is lifted off."""
 
     summary: Text = same(Scenario, "summary")
 
     lifted_from: Text
-    """The other one: its name, or its file relative to this one."""
+    """The other scenario: its name, or its file relative to this one."""
 
     travel_m: Vector3 = [0.0, 0.0, 0.1]
-    """Translation on top of the tilt, in proportion to it, at the end [m]."""
+    """Translation besides the tilt, proportional to it, at the end of the tilt [m]."""
 
     after: After = "hold"
-    """What comes after the tilt."""
+    """What follows the tilt: hold or leave."""

@@ -1,66 +1,66 @@
-"""Walks through the models of a scenario file: which of them describes the table at a key."""
+"""Walks the JSON Schema of scenario files: which tables may stand at a key, and their keys."""
 
 from __future__ import annotations
 
-from types import UnionType
-from typing import Annotated, Any, Literal, Union, get_args, get_origin
+from functools import cache
+from typing import Any
 
-from pydantic import BaseModel
+from pydantic import TypeAdapter
 
-from fulcrum.scenarios.schema.derive import table_of
-from fulcrum.synthesis.settings import Settings
+from fulcrum.scenarios.schema.tables import LiftedFile, ScenarioFile
+
+Schema = dict[str, Any]
 
 
-def table_at(model: type[BaseModel], loc: tuple[str | int, ...]) -> type[BaseModel]:
-    """The model of the table in which a location ends."""
-    reached: list[Any] = [model]
+@cache
+def json_schema() -> Schema:
+    """Return the JSON Schema of scenario files, as pydantic makes it."""
+    return TypeAdapter(ScenarioFile | LiftedFile).json_schema()
+
+
+def options(value: Schema) -> list[Schema]:
+    """Return what a value may be: references are followed, unions taken apart, null left out."""
+    if "$ref" in value:
+        return options(json_schema()["$defs"][value["$ref"].rpartition("/")[2]])
+    for union in ("anyOf", "oneOf"):
+        if union in value:
+            return [option for part in value[union] for option in options(part)]
+    return [] if value.get("type") == "null" else [value]
+
+
+def items(value: Schema) -> Schema | None:
+    """Return the schema of what a list holds, or a table with names of one's own; else None."""
+    named = [*value.get("patternProperties", {}).values(), value.get("additionalProperties")]
+    return value["items"] if "items" in value else named[0] or None
+
+
+def tables(value: Schema) -> list[Schema]:
+    """Return the tables with known keys that a value may be."""
+    return [option for option in options(value) if "properties" in option]
+
+
+def table_at(kind: str, loc: tuple[str | int, ...]) -> Schema:
+    """Return the table in which a location ends, in a file of a kind."""
+    reached = [{"$ref": kind}]
     for part in loc[:-1]:
-        inner = [step for annotation in reached for step in steps(annotation, part)]
-        reached = inner or reached  # a tag names no more than which of the union's members it is
-    found = tables(members(reached))
-    tagged = [t for t in found if set(tags(t)) & set(loc)]
-    return (tagged or found)[0]
+        # A tag names no more than which of the union's members it is: nothing is under it.
+        reached = [inner for value in reached for inner in _under(value, part)] or reached
+    found = [table for value in reached for table in tables(value)]
+    return next((table for table in found if tags(table) & set(loc)), found[0])
 
 
-def members(annotations: list[Any]) -> list[Any]:
-    """What annotations are made of, with unions and decorations taken apart."""
+def _under(value: Schema, part: str | int) -> list[Schema]:
+    """Return what a key or an index leads to."""
     found = []
-    for annotation in annotations:
-        origin, arguments = get_origin(annotation), get_args(annotation)
-        if origin is Annotated:
-            found += members([arguments[0]])
-        elif origin in (Union, UnionType):
-            found += members(list(arguments))
-        else:
-            found.append(annotation)
+    for option in options(value):
+        inner = option.get("properties", {}).get(part)
+        if inner is None and isinstance(part, int) == ("items" in option):
+            inner = items(option)
+        found += [] if inner is None else [inner]
     return found
 
 
-def tables(annotations: list[Any]) -> list[type[BaseModel]]:
-    """The models among annotations, and those of settings classes."""
-    types = [a for a in annotations if isinstance(a, type)]
-    found = [table_of(a) if issubclass(a, Settings) else a for a in types]
-    return [a for a in found if issubclass(a, BaseModel)]
-
-
-def steps(annotation: Any, part: str | int) -> list[Any]:
-    """What a key or an index of a value of that kind leads to."""
-    found = []
-    for member in members([annotation]):
-        for table in tables([member]):
-            if part in table.model_fields:
-                found.append(table.model_fields[str(part)].annotation)
-        if get_origin(member) is dict and isinstance(part, str):
-            found.append(get_args(member)[1])
-        elif get_origin(member) is list and isinstance(part, int):
-            found.append(get_args(member)[0])
-    return found
-
-
-def tags(table: type[BaseModel]) -> tuple[str, ...]:
-    """What the table's shape or kind may be, if that says which table it is."""
-    for name in ("shape", "kind"):
-        field = table.model_fields.get(name)
-        if field is not None and get_origin(field.annotation) is Literal:
-            return get_args(field.annotation)
-    return ()
+def tags(table: Schema) -> set[str]:
+    """Return the shapes or kinds that say which table it is."""
+    keys = (table["properties"].get(name, {}) for name in ("shape", "kind"))
+    return {tag for key in keys for tag in (key.get("const"), *key.get("enum", ())) if tag}

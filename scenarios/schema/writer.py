@@ -1,164 +1,134 @@
-"""Writes a scenario file with every key explained in a comment, from the models' docstrings."""
+"""Writes a scenario file with every key explained in a comment, from its JSON Schema."""
 
 from __future__ import annotations
 
 import json
 import textwrap
 from collections.abc import Mapping
-from types import UnionType
-from typing import Annotated, Any, Literal, Union, get_args, get_origin
+from typing import Any
 
-from pydantic import BaseModel
-from pydantic.fields import FieldInfo
-
-from fulcrum.scenarios.schema.tables import LiftedFile, ScenarioFile
-from fulcrum.scenarios.schema.walk import members, tables, tags
+from fulcrum.scenarios.schema.walk import Schema, items, json_schema, options, tables, tags
 
 _WIDTH = 100
-# Keys that the file leaves out stand there behind this, ready to be used.
+# Keys that the file leaves out are written behind this, ready to be used.
 _OFF = "#"
 _JOINT = "some_joint"
 
 
 def write(data: Mapping[str, Any], schema: str) -> str:
-    """The text of a scenario file that says what the data says.
+    """Return the text of a scenario file that says what the data says.
 
-    Keys that it leaves out are there as comments, with their default values.
+    Keys that the data leaves out are written as comments, with their default values.
 
     Args:
-        data: As tomllib reads it.
+        data: Content of a scenario file, as tomllib reads it.
         schema: Where editors find the JSON Schema.
     """
-    model = LiftedFile if "lifted_from" in data else ScenarioFile
-    lines = [f"#:schema {schema}", *_comment(model.__doc__ or "")]
-    return "\n".join([*lines, "", *_Writer().table(model, data, (), explained=True)]) + "\n"
+    kind = json_schema()["$defs"]["LiftedFile" if "lifted_from" in data else "ScenarioFile"]
+    lines = [f"#:schema {schema}", *_comment(kind), ""]
+    return "\n".join([*lines, *_Writer().table(kind, data, (), explained=True)]) + "\n"
 
 
 class _Writer:
     """Writes tables; of several of a kind, only the first is explained."""
 
     def __init__(self) -> None:
-        self._explained: set[type[BaseModel]] = set()
+        self._explained: set[str] = set()
 
     def table(
-        self,
-        model: type[BaseModel],
-        data: Mapping[str, Any] | None,
-        path: tuple[str, ...],
-        explained: bool,
+        self, table: Schema, data: Mapping[str, Any] | None, path: tuple[str, ...], explained: bool
     ) -> list[str]:
-        """The keys of a table, then the tables in it; without data, all as comments."""
+        """Return the keys of a table, then the tables in it; without data, all as comments."""
         lines: list[str] = []
         inner: list[str] = []
-        # What has to be said comes first.
-        for name, field in sorted(
-            model.model_fields.items(), key=lambda item: not item[1].is_required()
-        ):
+        required = table.get("required", [])
+        # Required keys come first.
+        for name, key in sorted(table["properties"].items(), key=lambda k: k[0] not in required):
             value = None if data is None else data.get(name)
-            found = tables(_parts(field))
-            if isinstance(value, Mapping) and not found:
-                inner += [*_comment(field.description or ""), f"[{'.'.join((*path, name))}]"]
-                inner += [*(f"{key} = {_text(item)}" for key, item in value.items()), ""]
-            elif found:
-                inner += self._inner(field, found, value, (*path, name), explained)
+            comment = _comment(key) if explained else []
+            form = options(key)[0]
+            item = items(form)
+            if found := tables(key if item is None else item):
+                inner += self._inner(form, found, value, (*path, name), comment)
+            elif isinstance(value, Mapping):
+                inner += [*_comment(key), f"[{'.'.join((*path, name))}]"]
+                inner += [*(f"{own} = {_text(item)}" for own, item in value.items()), ""]
             elif explained or value is not None:
-                lines += _comment(field.description or "") if explained else []
-                off = "" if value is not None else _OFF
-                shown = value if value is not None else _default(field)
-                lines += [f"{off}{name} = {_text(shown)}", *([""] if explained else [])]
+                off, shown = (_OFF, _default(key)) if value is None else ("", value)
+                lines += [*comment, f"{off}{name} = {_text(shown)}", *([""] if explained else [])]
         return [*lines, *([] if explained else [""]), *inner]
 
     def _inner(
         self,
-        field: FieldInfo,
-        found: list[type[BaseModel]],
+        form: Schema,
+        found: list[Schema],
         value: Any,
         path: tuple[str, ...],
-        explained: bool,
+        comment: list[str],
     ) -> list[str]:
-        """The tables of a key: one, several by name, or several in a row."""
-        kind = get_origin(_bare(field))
-        lines = _comment(field.description or "") if explained else []
-        off = "" if value is not None else _OFF
-        if kind is list:
-            if value is None:
+        """Return the tables of a key: one, several by name, or several in a row."""
+        own = ".".join(path)
+        if "properties" in form:
+            if value is None and not comment:
                 return []
-            for item in value:
-                lines += [f"[[{'.'.join(path)}]]", *self._once(found, item, path)]
-            return lines
-        if kind is dict:
-            for name, item in (value or {}).items():
-                own = (*path, name)
-                lines += [f"[{'.'.join(own)}]", *self._once(found, item, own)]
-            return lines if value else []
-        if value is None and not explained:
+            return [
+                *comment,
+                f"{_OFF if value is None else ''}[{own}]",
+                *self._once(found, value, path),
+            ]
+        if not value:
             return []
-        return [*lines, f"{off}[{'.'.join(path)}]", *self._once(found, value, path)]
+        if "items" in form:
+            named = [(f"[[{own}]]", item, path) for item in value]
+        else:
+            named = [(f"[{own}.{name}]", item, (*path, name)) for name, item in value.items()]
+        lines = (line for head, *item in named for line in (head, *self._once(found, *item)))
+        return [*comment, *lines]
 
-    def _once(self, found: list[type[BaseModel]], item: Any, path: tuple[str, ...]) -> list[str]:
-        """A table that is explained if none of its kind has been."""
-        model = _chosen(found, item)
-        explained = model not in self._explained
-        self._explained.add(model)
-        return self.table(model, item, path, explained)
-
-
-def _bare(field: FieldInfo) -> Any:
-    """The annotation of a field without None."""
-    return next(a for a in members([field.annotation]) if a is not type(None))
-
-
-def _parts(field: FieldInfo) -> list[Any]:
-    """What a field's value, or the values in its list or dictionary, may be."""
-    bare = _bare(field)
-    if get_origin(bare) in (dict, list):
-        return members([get_args(bare)[-1]])
-    return members([field.annotation])
+    def _once(self, found: list[Schema], item: Any, path: tuple[str, ...]) -> list[str]:
+        """Return a table, explained if none of its kind has been."""
+        given = set() if item is None else {item.get("shape"), item.get("kind", "tilt")}
+        table = next((table for table in found if tags(table) & given), found[0])
+        explained = table["title"] not in self._explained
+        self._explained.add(table["title"])
+        return self.table(table, item, path, explained)
 
 
-def _chosen(found: list[type[BaseModel]], item: Any) -> type[BaseModel]:
-    """Which of the members of a union a table is."""
-    given = {item.get("shape"), item.get("kind", "tilt")} if item is not None else set()
-    return next((model for model in found if set(tags(model)) & given), found[0])
+def _default(key: Schema) -> Any:
+    """Return the default, or an example where there is none."""
+    default = key.get("default")
+    return _example(key) if default in (None, [], {}) else default
 
 
-def _default(field: FieldInfo) -> Any:
-    """The default, or an example where there is none."""
-    if field.default or field.default in (0.0, False, ""):
-        return field.default
-    return _example(field.annotation)
+def _example(value: Schema) -> Any:
+    """Return a value that may stand there."""
+    kind = options(value)[0]
+    for examples in (kind.get("examples"), kind.get("enum")):
+        if examples:
+            return examples[0]
+    inner = items(kind)
+    match kind["type"]:
+        case "array":
+            return [_example(inner or {})]
+        case "object":
+            return {_JOINT: _example(inner or {})}
+        case "number":
+            return 1.0
+        case _:
+            return _JOINT
 
 
-def _example(annotation: Any) -> Any:
-    """A value of a kind."""
-    origin, arguments = get_origin(annotation), get_args(annotation)
-    if origin in (Union, UnionType):
-        return _example(arguments[0])
-    if origin is Annotated:
-        extras = [e for e in arguments[1:] if isinstance(e, FieldInfo) and e.examples]
-        return extras[0].examples[0] if extras and extras[0].examples else _example(arguments[0])
-    if origin is Literal:
-        return arguments[0]
-    if origin is dict:
-        return {_JOINT: _example(arguments[1])}
-    if origin is list:
-        return [_example(arguments[0])]
-    return 1.0 if annotation is float else _JOINT
-
-
-def _comment(text: str) -> list[str]:
-    words = " ".join(text.split())
+def _comment(value: Schema) -> list[str]:
+    words = " ".join(value.get("description", "").split())
     return textwrap.wrap(words, _WIDTH, initial_indent="# ", subsequent_indent="# ")
 
 
 def _text(value: Any) -> str:
-    """A value in TOML."""
+    """Return a value in TOML."""
     if isinstance(value, Mapping):
         return f"{{ {', '.join(f'{name} = {_text(item)}' for name, item in value.items())} }}"
     if isinstance(value, list):
         return f"[{', '.join(map(_text, value))}]"
     if isinstance(value, bool):
         return str(value).lower()
-    if isinstance(value, str):
-        return json.dumps(value, ensure_ascii=False)
-    return repr(value)
+    return json.dumps(value, ensure_ascii=False) if isinstance(value, str) else repr(value)

@@ -34,14 +34,15 @@ class Capacity:
 
     Attributes:
         manoeuvre: pivot or lift.
-        weight: That can be held at every tilt of the path [N]; infinite if any can.
-        mass: [kg].
-        tilt_deg: Where it is limited [deg].
-        lightest: The least weight that can be held at every tilt [N]; above 0 if preloads need it.
-        conflict: What limits it there; None if nothing does.
-        confirmed_within: How near to the weight solving again tells feasible from infeasible [-].
+        weight: Largest weight that can be held at every tilt of the path [N]; infinite if any can.
+        mass: Mass of that weight [kg].
+        tilt_deg: Tilt that limits the weight [deg].
+        lightest: Least weight that can be held at every tilt [N]; above 0 if preloads need it.
+        conflict: What limits the weight at that tilt; None if nothing does.
+        confirmed_within: Relative distance to the weight at which a second solve still tells
+            feasible from infeasible [-].
         tilts_deg: Grid of tilts [deg].
-        weights: Largest weight at each [N]; 0 where none can be held.
+        weights: Largest weight at each tilt [N]; 0 where none can be held.
     """
 
     manoeuvre: str
@@ -57,28 +58,28 @@ class Capacity:
     def page(self) -> Page:
         """Return the capacity, what limits it, and how well that is confirmed as a page."""
         if self.weight == math.inf:
-            return page(f"{self.manoeuvre}: any weight; nothing limits the grip")
+            return page(f"{self.manoeuvre}: any weight, as nothing limits the grip")
         curve = dict(zip(self.tilts_deg, self.weights, strict=True))
         end = max(curve)
         lightest = limited = confirmed = ""
         if self.lightest > 0.0:
-            lightest = f"  at least {self.lightest:.4g} N, as the preloads ask"
+            lightest = f"  at least {self.lightest:.4g} N, or the preloads would move the object"
         if self.conflict is not None:
             limits, balances = ", ".join(self.conflict.limits), ", ".join(self.conflict.balances)
-            limited = f"  there {limits} against {balances}"
+            limited = f"  limited by {limits}; beyond, these fail: {balances}"
         if self.weight > 0.0 and math.isfinite(self.confirmed_within):
             confirmed = (
-                "  feasible just below and infeasible just above, when solved again "
-                f"{self.confirmed_within:.0e} to either side"
+                "  confirmed: feasible below and infeasible above, at a relative distance of "
+                f"{self.confirmed_within:.0e}"
             )
         elif self.weight > 0.0:
-            confirmed = "  not confirmed by solving again to either side"
+            confirmed = "  not confirmed by solving again below and above"
         return page(
             (
                 Marked(self.manoeuvre),
                 f": {self.weight:.4g} N ({self.mass:.4g} kg), limited at {self.tilt_deg:.4g} deg; "
-                f"{curve[0.0]:.4g} N at 0 deg, {curve[end]:.4g} N at {end:g} deg, "
-                f"{max(curve.values()):.4g} N at best",
+                f"at 0 deg {curve[0.0]:.4g} N, at {end:g} deg {curve[end]:.4g} N, "
+                f"at the best tilt {max(curve.values()):.4g} N",
             ),
             lightest,
             limited,
@@ -89,7 +90,7 @@ class Capacity:
 def capacities(
     scenario: Scenario, control: Control, progress: Progress | None = None
 ) -> tuple[Capacity, ...]:
-    """What can be pivoted, if the scenario has supports, and what can be lifted, without them.
+    """Return what can be pivoted, if there are supports, and what can be lifted without them.
 
     Args:
         scenario: The scene; its object's mass is where the search starts from.

@@ -1,4 +1,4 @@
-"""Why a scenario's problem is infeasible and what would help, or how much a feasible one bears."""
+"""Explains why no forces exist and what to change, or how much a feasible problem may change."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ _ACTIVE = 1e-6
 
 
 def tightest_tilt(problems: PathProblems, synthesizer: Synthesizer) -> float:
-    """The first infeasible tilt of a scan, else the one that bears the least weight [deg]."""
+    """Return the first infeasible tilt of a scan, or the one that holds the least weight [deg]."""
     tilts = problems.tilts(_SCAN_DEG)
     heaviest = []
     for tilt in tilts:
@@ -53,7 +53,7 @@ def tightest_tilt(problems: PathProblems, synthesizer: Synthesizer) -> float:
 
 
 def explain(problems: PathProblems, tilt_deg: float, synthesizer: Synthesizer) -> Explanation:
-    """Explains the problem at a tilt [deg].
+    """Explain the problem at a tilt [deg].
 
     Raises:
         InvalidInputError: The tilt is not on the path.
@@ -165,13 +165,13 @@ def _active(solution: Solution) -> tuple[str, ...]:
 
 
 def _words(change: Change, problem: Problem, gravity: Gravity) -> str:
-    """A change in a few words, with the numbers that it stands for."""
+    """Return a change in a few words, with the numbers that it stands for."""
     kind, factor = change.kind, change.factor
     if change.outcome is ChangeOutcome.ABSENT:
-        return f"no {kind}"
+        return f"there are no {kind}"
     if change.outcome is ChangeOutcome.NEVER:
         return {
-            Kind.FRICTION: f"no friction helps (up to {factor:.4g} times)",
+            Kind.FRICTION: f"does not help, not even {factor:.4g} times as much friction",
             Kind.TORQUE: "does not help, not even without torque limits",
             Kind.WEIGHT: "does not help, not even without weight",
             Kind.GRIP: "does not help, not even without grip limits",
@@ -179,11 +179,11 @@ def _words(change: Change, problem: Problem, gravity: Gravity) -> str:
     if change.outcome is ChangeOutcome.ALWAYS:
         if kind is Kind.WEIGHT:
             return "any weight"
-        return f"down to {factor:.3g} times and less" if factor else "down to nothing"
-    # More friction, torque or grip, or less weight, is what an infeasible problem needs; the other
-    # way round it is what a feasible one bears.
+        return f"by a factor of {factor:.3g} or less" if factor else "to any value, even 0"
+    # More friction, torque or grip, or less weight, is what an infeasible problem needs; a feasible
+    # one allows for the opposite.
     needed = (factor > 1.0) is (kind is not Kind.WEIGHT)
-    more, less = ("at least", "at most") if needed else ("up to", "down to")
+    more, less = ("to at least", "to at most") if needed else ("up to", "down to")
     text = f"{more if factor > 1.0 else less} {factor:.4g} times"
     if kind is Kind.WEIGHT:
         text += f" ({factor * gravity.weight:.4g} N)"
@@ -195,7 +195,7 @@ def _words(change: Change, problem: Problem, gravity: Gravity) -> str:
 
 
 def _numbers(values: dict[str, float], unit: str) -> str:
-    """Values by name, those that are equal together."""
+    """Return values by name, equal ones together."""
     names: dict[str, list[str]] = {}
     for name, value in values.items():
         if math.isfinite(value):

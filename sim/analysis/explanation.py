@@ -1,4 +1,4 @@
-"""What is to be said about a scenario's problem at one tilt: why not, or how much it bears."""
+"""What limits a scenario at one tilt, by how much, and what to change: results and their page."""
 
 from __future__ import annotations
 
@@ -7,9 +7,9 @@ from dataclasses import dataclass
 from fulcrum.synthesis.analysis import ChangeOutcome, Conflict, Kind, Sensitivities
 from fulcrum.synthesis.render import Mark, Marked, Page, page, table
 
-# By which share of it a limit is relaxed to see whether that helps.
+# Share by which a limit is relaxed to see whether that helps [-].
 RELAXED = 0.1
-# How many of the constraints that stop a change are named.
+# Number of constraints named that limit a change.
 _NAMED = 4
 # Relative slopes by the centre of mass below this are not shown [1/m]: 0.001 % per mm.
 _VISIBLE_PER_M = 0.01
@@ -17,15 +17,15 @@ _VISIBLE_PER_M = 0.01
 
 @dataclass(frozen=True)
 class Remedy:
-    """One kind of change: what is needed of it, or what can be borne.
+    """One kind of change on its own: how much of it is needed, or is possible.
 
     Attributes:
         outcome: See :class:`synthesis.analysis.relaxation.ChangeOutcome`.
-        factor: The border of the feasible factors [-]; infinite for "any weight".
-        confirmed_within: How near to the border solving again tells feasible from infeasible [-];
-            infinite if not confirmed.
-        text: In words.
-        conflict: What stands in the way beyond the border.
+        factor: Factor at which feasibility ends or begins [-]; infinite for "any weight".
+        confirmed_within: Relative distance to that factor at which a second solve still tells
+            feasible from infeasible [-]; infinite if not confirmed.
+        text: The change in words.
+        conflict: Constraints that limit the change at that factor.
     """
 
     outcome: ChangeOutcome
@@ -37,12 +37,12 @@ class Remedy:
 
 @dataclass(frozen=True)
 class Influence:
-    """What a parameter does to the objective.
+    """Effect of a parameter on the objective.
 
     Attributes:
-        value: Of the parameter.
-        unit: Of the parameter.
-        slope: Derivative of the objective by it, in their units.
+        value: Value of the parameter.
+        unit: Unit of the parameter.
+        slope: Derivative of the objective by the parameter, in their units.
         per_percent: Change of the objective per percent of the parameter [%].
     """
 
@@ -57,12 +57,12 @@ class Optimum:
     """The optimal solution of a feasible problem.
 
     Attributes:
-        value: The objective, in ``unit``.
+        value: Value of the objective, in ``unit``.
         unit: N, N·m or -.
-        normal_forces: Of each contact [N].
+        normal_forces: Normal force of each contact [N].
         active: Limits that are reached.
         sensitivities: Derivatives of the value.
-        influences: The parameters that matter, by name.
+        influences: Parameters that change the value, by name.
     """
 
     value: float
@@ -86,30 +86,30 @@ class Optimum:
                 share = 1e-3 * slope / self.value if self.value else 0.0
                 change = f"{100 * share:+.2f} per mm"
                 rows.append((f"centre of mass along {axis}", "per m", f"{slope:+.4g}", change))
-        head = ("sensitivity", "value", f"slope [{self.unit} per unit]", "per 1 % [%]")
+        head = ("parameter", "value", f"slope [{self.unit} per unit]", "effect of +1 % [%]")
         return page(
-            f"Objective {self.value:.5g}{unit}; normal forces: {forces}",
-            f"At their limits: {', '.join(self.active) or 'none'}",
+            f"Optimal value {self.value:.5g}{unit}; normal forces: {forces}",
+            f"Limits reached: {', '.join(self.active) or 'none'}",
             table(head, rows),
         )
 
 
 @dataclass(frozen=True)
 class Explanation:
-    """All that is to be said about a scenario's problem at one tilt.
+    """What limits a scenario's problem at one tilt, and by how much.
 
     Attributes:
         scenario: Name of the scenario.
         object: Name of the object.
         objective: What is minimised.
-        tilt_deg: [deg].
-        weight: Of the object [N].
-        feasible: Whether there are forces.
-        conflict: Why not, of an infeasible problem.
-        gains: By how much more weight can be held [-] if one limit of the conflict alone is relaxed
-            by ``RELAXED``; of an infeasible problem that holds some weight.
-        optimum: The solution of a feasible one.
-        changes: By kind: what would help, or what is borne.
+        tilt_deg: Tilt [deg].
+        weight: Weight of the object [N].
+        feasible: Whether forces exist that hold the object.
+        conflict: Why no forces exist; None for a feasible problem.
+        gains: Relative gain of the weight that can be held [-] if only this limit of the conflict
+            is relaxed by ``RELAXED``; empty if no weight can be held.
+        optimum: Solution of a feasible problem; else None.
+        changes: What each kind of change needs to be on its own, or may be.
     """
 
     scenario: str
@@ -146,24 +146,26 @@ class Explanation:
             blocked = remedy.conflict
             names = [] if blocked is None else list(blocked.limits or blocked.balances)
             rows.append((kind, remedy.text, ", ".join(names[:_NAMED])))
-        bound = "possible alone" if self.feasible else "needed alone"
-        return shown + page(table(("change", bound, "limited by"), rows))
+        if self.feasible:
+            what = "Forces still exist if one of these changes, the others staying as they are:"
+            return shown + page(what, table(("quantity", "may change", "then limited by"), rows))
+        what = "Forces exist after any one of these changes, the others staying as they are:"
+        return shown + page(what, table(("quantity", "must change", "limited until then by"), rows))
 
 
 def _conflict_page(conflict: Conflict, gains: dict[str, float]) -> Page:
-    """The sentence of a conflict, its balances, and its limits with what each can give."""
+    """Return the sentence of a conflict, and its limits with what each provides and would gain."""
     sentence = conflict.sentence
-    rows = [(name, f"{100 * share:.2f}", "", "") for name, share in conflict.balances.items()]
-    for name, share in conflict.limits.items():
+    rows = []
+    for name in conflict.limits:
         given, gain = conflict.given.get(name), gains.get(name)
         rows.append(
             (
                 name,
-                f"{100 * share:.2f}",
-                "" if given is None else f"{100 * given:.2f}",
-                "" if gain is None else f"{100 * gain:+.2f}",
+                "" if given is None else f"{100 * given:.1f}",
+                "" if gain is None else f"{100 * gain:z.1f}",
             )
         )
-    relaxed = f"alone {100 * RELAXED:.0f} % better [% more weight]"
-    head = ("conflict", "share [%]", "can give [% of asked]", relaxed)
+    gained = f"weight gained if it alone is relaxed by {100 * RELAXED:.0f} % [%]"
+    head = ("limit", "provides at most [% of the load]", gained)
     return page(f"{sentence[0].upper()}{sentence[1:]}.", table(head, rows))

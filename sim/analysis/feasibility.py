@@ -118,8 +118,8 @@ class Feasibility:
             else (question, "no: see below", f"{misfit.tilt_deg:.1f} deg")
             for question, misfit, where in (
                 ("contacts on the surface", around.supports, contacts),
-                ("room for the object", around.room, ""),
-                ("stands before and after", around.stand, ""),
+                ("object clear of obstacles", around.room, ""),
+                ("object stable at both ends", around.stand, ""),
             )
         ]
 

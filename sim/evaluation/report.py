@@ -1,4 +1,4 @@
-"""What a run gave: verdict, outcome, failures, and the numbers that they rest on."""
+"""Results of a run: verdict, outcome, failures, and the measurements behind them."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ from fulcrum.synthesis.render import (
 
 
 class Verdict(StrEnum):
-    """How a run ended."""
+    """Judgement of a run."""
 
     PASS = "pass"
     FAIL = "fail"
@@ -31,7 +31,7 @@ class Verdict(StrEnum):
 
     @property
     def shown(self) -> Marked:
-        """The verdict as pages show it."""
+        """The verdict as shown on pages."""
         return Marked(self.upper(), _MARKS[self])
 
 
@@ -44,7 +44,7 @@ _MARKS = {
 
 @dataclass(frozen=True)
 class PhaseReport:
-    """A stretch of the run in one phase: its name, and when it was [s]."""
+    """A part of the run in one phase: its name, start and end [s]."""
 
     name: str
     start_s: float
@@ -53,7 +53,7 @@ class PhaseReport:
 
 @dataclass(frozen=True)
 class TiltReport:
-    """Target, final value and errors of the tilt [deg]; how far off its place it ended [mm]."""
+    """Target, final value and errors of the tilt [deg]; final position error [mm]."""
 
     target_deg: float
     final_deg: float
@@ -64,11 +64,11 @@ class TiltReport:
 
 @dataclass(frozen=True)
 class ContactReport:
-    """What one contact did while the object was held with full grip.
+    """Measurements of one contact while the object was held with full grip.
 
-    Slip, slide, spin and utilisation count until it let go for the first time.
-    ``free_normal_n`` is the largest normal force while no grip was asked for: a hand's impact.
-    ``longest_gap_ms`` is the longest stretch without a normal force.
+    Slip, slide, spin and utilisation are measured until the contact is lost for the first time.
+    ``free_normal_n`` is the largest normal force while no grip was commanded: a hand's impact.
+    ``longest_gap_ms`` is the longest time without a normal force.
     """
 
     kept_fraction: float
@@ -83,13 +83,13 @@ class ContactReport:
 
     @property
     def kept_percent(self) -> float:
-        """Share of the steps at which it was kept [%], rounded down to a decimal: 100 is all."""
+        """Share of the steps with contact [%], rounded down to a decimal, so that 100 means all."""
         return math.floor(1e3 * self.kept_fraction) / 10.0
 
 
 @dataclass(frozen=True)
 class TorqueReport:
-    """Largest share of a torque limit, at which joint, and how often a torque was cut."""
+    """Largest share of a torque limit used, its joint, and share of steps with a torque cut."""
 
     max_utilisation: float
     joint: str
@@ -98,7 +98,7 @@ class TorqueReport:
 
 @dataclass(frozen=True)
 class SynthesisReport:
-    """Syntheses (robot quantities, assembly, solve, unpacking): how many, failed, wall time."""
+    """Number of syntheses and of failed ones, and their wall time with assembly and unpacking."""
 
     solves: int
     failures: int
@@ -143,7 +143,7 @@ class Report:
 
     @property
     def sentences(self) -> tuple[str, ...]:
-        """The failures in words."""
+        """The failures as sentences."""
         return tuple(failure.text for failure in self.failures)
 
     def page(self) -> Page:
@@ -168,7 +168,7 @@ class Report:
             Heading((f"{self.scenario}: ", self.verdict.shown)),
             Bullets(self.sentences),
             table(
-                ("time [s]", "found", "done"),
+                ("time [s]", "event", "reaction"),
                 [(f"{e.t:.3f}", e.text, e.reaction) for e in self.events],
             ),
             f"Outcome: {self.outcome}. Controller {self.controller}, objective {self.objective}, "
@@ -185,7 +185,7 @@ class Report:
 
 @dataclass(frozen=True)
 class RunInfo:
-    """What a run was: the parts of the report that are no measurement of the trace.
+    """Facts about a run that its trace does not contain.
 
     Attributes:
         controller: Name of the controller.

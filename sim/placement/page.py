@@ -1,4 +1,4 @@
-"""What a search for a placement found, as a page."""
+"""The page of a search for a placement."""
 
 from __future__ import annotations
 
@@ -14,24 +14,26 @@ _LISTED_DEG = 1.0
 
 
 def placement_page(scenario: Scenario, found: Placement) -> Page:
-    """Return what was gained, what was refused, what moved, and the run that tried it.
+    """Return what was gained, what was refused, what moved, and the run that tested it.
 
     Args:
-        scenario: What the search began with.
-        found: What it found.
+        scenario: Scene before the search.
+        found: Result of the search.
     """
     better = found.improved
     verdict = Marked("BETTER", Mark.GOOD) if better else Marked("NOTHING BETTER", Mark.BAD)
-    done, end = found.history[-1][0], "" if found.in_time else ", where the time ended"
-    refused = [f"better, but refused: {reason}" for reason in dict.fromkeys(found.refused)]
+    done, end = found.history[-1][0], "" if found.in_time else " (time limit)"
+    refused = [
+        f"a better candidate was rejected: {reason}" for reason in dict.fromkeys(found.refused)
+    ]
     shown = page(
         (
             f"{scenario.name}, goal {found.goal}: ",
             verdict,
-            f" after {done} placements, {found.seconds:.0f} s{end}",
+            f" after {done} placements in {found.seconds:.0f} s{end}",
         ),
         table(("over the path", "before", "after"), _rows(found.before, found.after)),
-        "" if found.before.feasible else f"before: {found.before.reason}",
+        "" if found.before.feasible else f"Before: {found.before.reason}",
         Lines(tuple(refused)),
     )
     report = found.report
@@ -39,9 +41,9 @@ def placement_page(scenario: Scenario, found: Placement) -> Page:
         return shown
     slip = max(contact.slip_mm for contact in report.contacts.values())
     return shown + page(
-        table(("moved", "from", "to"), _moves(scenario, found.scenario)),
+        table(("change", "from", "to"), _moves(scenario, found.scenario)),
         (
-            "in closed loop: ",
+            "In closed loop: ",
             report.verdict.shown,
             f", tilt error at most {report.tilt.max_error_deg:.3f} deg, slip at most {slip:.3f} mm,"
             f" torque at most {100 * report.torque.max_utilisation:.0f} % of its limit "
@@ -55,11 +57,17 @@ def _rows(before: Value, after: Value) -> list[tuple[str, ...]]:
         return f"{100.0 * value:.1f} %" if math.isfinite(value) else "-"
 
     return [
-        ("forces", *("yes" if value.feasible else "no" for value in (before, after))),
+        ("forces exist", *("yes" if value.feasible else "no" for value in (before, after))),
         ("heaviest object", *(f"{value.heaviest:.2f} N" for value in (before, after))),
-        ("friction used, at the least", *(share(value.friction) for value in (before, after))),
-        ("torque used, at the least", *(share(value.torque) for value in (before, after))),
-        ("from joint limits", *(f"{value.clearance:.3g} rad or m" for value in (before, after))),
+        ("largest share of friction used", *(share(value.friction) for value in (before, after))),
+        (
+            "largest share of torque limits used",
+            *(share(value.torque) for value in (before, after)),
+        ),
+        (
+            "least distance to a joint limit",
+            *(f"{value.clearance:.3g} rad or m" for value in (before, after)),
+        ),
     ]
 
 

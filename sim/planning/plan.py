@@ -1,4 +1,4 @@
-"""A planned tilt: the fastest, easiest or safest timing of a scenario's path, and the forces."""
+"""A planned tilt: timing of a scenario's path and its forces, and the page that shows them."""
 
 from __future__ import annotations
 
@@ -27,21 +27,23 @@ from fulcrum.synthesis.path import (
 from fulcrum.synthesis.render import Marked, Page, page, table, to_markdown
 from fulcrum.synthesis.robust import UncertaintySet
 
-# What the solver's accuracy may add to a limit that a plan uses up, as a share of it [-].
+# Share by which the solver's accuracy may exceed a limit [-].
 _EXCESS = 1e-6
-# Limits of which less than this share is used at most are not listed [-].
+# Limits used by less than this share are not listed [-].
 _LISTED = 0.5
 
 
 class PlanError(FulcrumError):
-    """No timing of the tilt keeps all limits; names those that weigh most, and at which tilt."""
+    """No timing of the tilt keeps all limits; names those that limit it most, and at which tilt."""
 
     def __init__(self, scenario: str, what: str, binding: list[tuple[str, float]]) -> None:
         self.binding = binding
         named = [
             name if math.isnan(tilt) else f"{name} at {tilt:.1f} deg" for name, tilt in binding
         ]
-        super().__init__(f"{scenario}: {what} breaks a limit; most binding: {', '.join(named)}.")
+        super().__init__(
+            f"{scenario}: {what} breaks a limit; these limit it most: {', '.join(named)}."
+        )
 
 
 class Moment(NamedTuple):
@@ -83,12 +85,12 @@ class Plan:
     """Timing, joint motion and forces of a tilt, from rest to rest.
 
     Attributes:
-        scenario: What is tilted.
-        margins: What it keeps clear of.
+        scenario: Scene of the tilt.
+        margins: Distances kept to the limits.
         joints: Names of the joints.
         solution: Timing and forces; its path coordinate is the share of the tilt.
         q: Joint angles over that share.
-        share: How much it serves of the uncertainty that was asked for [-]; 1 is all of it.
+        share: Share of the given uncertainty that the plan holds for [-]; 1 is all of it.
     """
 
     scenario: Scenario
@@ -105,21 +107,21 @@ class Plan:
 
     @property
     def times(self) -> Array:
-        """When the grid points are reached [s], (K,)."""
+        """Times of the grid points [s], (K,)."""
         return self.solution.times
 
     @property
     def duration(self) -> float:
-        """Of the tilt [s]."""
+        """Duration of the tilt [s]."""
         return self.solution.duration
 
     @property
     def peak_rate(self) -> float:
-        """The fastest that it turns [rad/s]."""
+        """Largest rate of the tilt [rad/s]."""
         return math.sqrt(self.solution.b.max()) * math.radians(self.scenario.path.angle_deg)
 
     def at(self, t: float) -> Moment:
-        """The plan at a time [s]; before its start and after its end at rest there.
+        """Return the plan at a time [s]: at rest before its start and after its end.
 
         The timing is exact; forces and torques are linear in the tilt between grid points, where
         they jump. With a force rate they and the acceleration are linear in time between the
@@ -150,14 +152,14 @@ class Plan:
         )
 
     def _between(self, k: Indices, part: Array) -> tuple[Array, Array]:
-        """Wrenches, (n, m, 6), and torques, (n, l), that far in intervals k."""
+        """Return wrenches, (n, m, 6), and torques, (n, l), at fractions of intervals k."""
         w, tau = self.solution.w_OC_C[0], self.solution.tau[0]
         first, second = 2 * k, 2 * k + 1
         w = w[first] + part[:, None, None] * (w[second] - w[first])
         return w, tau[first] + part[:, None] * (tau[second] - tau[first])
 
     def along(self, tilts: Array) -> Along:
-        """The plan over the tilt instead of time, with forces and torques as in :meth:`at`.
+        """Return the plan over the tilt instead of time, with forces and torques as in :meth:`at`.
 
         Args:
             tilts: [rad], (k,); beyond its ends the plan's at those.
@@ -172,7 +174,7 @@ class Plan:
         return Along(rate * math.radians(self.scenario.path.angle_deg), w, tau)
 
     def stretched(self, factor: float) -> Plan:
-        """The same motion in ``factor`` times the duration, with forces of its own.
+        """Return the same motion in ``factor`` times the duration, with forces of its own.
 
         They are best for the plan's objective; of a plan in least time they have the largest
         friction margin.
@@ -195,7 +197,7 @@ class Plan:
         return replace(self, solution=_solve(self.scenario, problem, what))
 
     def _check_speeds(self, factor: float, what: str) -> None:
-        """Refuses what breaks limits of speed or acceleration, which no forces could change."""
+        """Refuse a motion that breaks limits of speed or acceleration, which no forces change."""
         places = self.tilt[self.solution.problem.stations[:, 0]]
         broken: dict[str, tuple[float, float]] = {}
         for kind, power in (("speed", 1), ("acceleration", 2)):
@@ -209,7 +211,7 @@ class Plan:
             raise PlanError(self.scenario.name, what, [(worst, broken[worst][1])])
 
     def stretches(self) -> list[tuple[float, float, tuple[str, ...]]]:
-        """Stretches of the path along which the same limits are used up: from, to [deg], which."""
+        """Return the parts of the path with the same limits reached: from, to [deg], which."""
         used = self.solution.active()
         tilts = np.degrees(self.tilt)
         merged: list[tuple[float, float, tuple[str, ...]]] = []
@@ -224,13 +226,12 @@ class Plan:
         return merged
 
     def page(self) -> Page:
-        """Return duration, proof, stretches of the tilt and the limits used most as a page."""
+        """Return duration, errors, the limits reached over the tilt, and the limits used most."""
         found, residuals = self.solution, self.solution.residuals
         places = np.degrees(self.tilt[found.problem.stations[:, 0]])
         used = sorted(found.shares.items(), key=lambda item: -item[1].max())
-        grip = (
-            f"One grip for {len(found.problem.loads)} worlds: {100 * self.share:.0f} % of the set"
-        )
+        worlds, share = len(found.problem.loads), f"{100 * self.share:.0f} %"
+        grip = f"One grip holds in {worlds} worlds: in {share} of the uncertainty set"
         return page(
             (
                 Marked(f"{self.scenario.name}, {found.problem.objective}"),
@@ -240,10 +241,10 @@ class Plan:
                 f"{math.degrees(self.peak_rate):.1f} deg/s; solved in {1e3 * found.solve_s:.0f} ms",
             ),
             f"{grip} of controller robust." if len(found.problem.loads) > 1 else "",
-            f"Limits and balance kept to {max(residuals.primal, 0.0):.1e}, optimal to "
+            f"Relative errors: limits and balance {max(residuals.primal, 0.0):.1e}, optimality "
             f"{max(residuals.dual, residuals.gap):.1e}.",
             table(
-                ("tilt [deg]", "limits used up"),
+                ("tilt [deg]", "limits reached"),
                 [
                     (f"{low:.1f} to {high:.1f}", ", ".join(limits) or "none")
                     for low, high, limits in self.stretches()
@@ -272,7 +273,7 @@ def plan(
     uncertainty: UncertaintySet = CERTAIN,
     robot: RobotModel | None = None,
 ) -> Plan:
-    """Plans the tilt of a scenario.
+    """Plan the tilt of a scenario.
 
     Args:
         scenario: The scene; the timing and the forces of its own phases do not count.

@@ -17,7 +17,7 @@ from fulcrum.sim.sweep.episode import check_holdable, run_episode
 from fulcrum.sim.sweep.store import Store
 from fulcrum.sim.sweep.summary import Score, scores
 from fulcrum.synthesis import FulcrumError, InvalidInputError
-from fulcrum.synthesis.render import Lines, Marked, Page, page, table, to_markdown
+from fulcrum.synthesis.render import Lines, Page, page, table, to_markdown
 
 # How many causes of failures are named.
 _NAMED = 6
@@ -39,18 +39,18 @@ class LostEpisodesError(FulcrumError):
 
 @dataclass(frozen=True, eq=False)
 class SweepResult:
-    """What a sweep gave.
+    """Results of a sweep.
 
     Attributes:
         rows: All episodes, one row each.
-        scores: What they come to, by controller.
+        scores: Success rate and causes of failure of each controller.
     """
 
     rows: pa.Table
     scores: tuple[Score, ...]
 
     def page(self) -> Page:
-        """Return each controller's success rate, and what its failures began with, as a page."""
+        """Return each controller's success rate, first causes of failure, and replays as a page."""
         rows = [
             (
                 score.controller,
@@ -64,12 +64,14 @@ class SweepResult:
             for score in self.scores
         ]
         head = ("controller", "episodes", "success (95 %) [%]", "grip [N]")
-        more = ("friction used [%]", "force error [N]", "failures began with")
+        more = ("friction used [%]", "force error [N]", "first causes of failure")
         replays = [(s.controller, s.causes[0]) for s in self.scores if s.causes]
         return page(
-            Marked("Sweep"),
+            "Success rates with their 95 % intervals, and medians over the episodes:",
             table((*head, *more), rows),
-            Lines(tuple(f"{name}, {first.cause}: {first.replay}" for name, first in replays)),
+            Lines(
+                tuple(f"Replay of {name}, {first.cause}: {first.replay}" for name, first in replays)
+            ),
         )
 
     def _repr_markdown_(self) -> str:
@@ -77,7 +79,7 @@ class SweepResult:
 
 
 def _named(score: Score) -> str:
-    """The most frequent causes of a controller's failures."""
+    """Return the most frequent causes of a controller's failures."""
     named = ", ".join(f"{c.cause} ({c.episodes})" for c in score.causes[:_NAMED])
     more = len(score.causes) - _NAMED
     return (named or "none") + (f" and {more} more" if more > 0 else "")
@@ -86,15 +88,15 @@ def _named(score: Score) -> str:
 def run_sweep(
     sweep: Sweep, out: Path, workers: Workers = LOCAL, progress: SweepProgress | None = None
 ) -> SweepResult:
-    """Runs the episodes that are missing in a folder.
+    """Run the episodes that are missing in a folder.
 
     Dask gives the episodes of a worker that dies to another one. What has been written survives
     whatever happens to this process: another call with the same folder goes on from there.
 
     Args:
-        sweep: Who meets which worlds.
+        sweep: Controllers and worlds.
         out: New or empty folder, or one of the same sweep.
-        workers: Who runs the episodes.
+        workers: Processes or cluster that run the episodes.
         progress: Called after each.
 
     Raises:

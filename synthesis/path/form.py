@@ -125,7 +125,7 @@ class PathForm:
     def _matrices(self, form: ConicForm, problems: tuple[Problem, ...]) -> tuple[Array, Array]:
         pairs = [form.matrices(problem) for problem in problems]
         A = np.stack([A[:, : form.aux_column] for A, _ in pairs])
-        b = [b * form.force_unit(p) for (_, b), p in zip(pairs, problems, strict=True)]
+        b = [b * p.unit for (_, b), p in zip(pairs, problems, strict=True)]
         return A, np.stack(b) / self.unit
 
     def _add_motion(

@@ -78,7 +78,10 @@ BROKEN = {
         LEFT_AT, "point_m = [0, 0.1, 0]\nnormal = [0, 0, 0]", "hands.left.normal", "a direction"
     ),
     "tangent along normal": Broken(
-        LEFT_AT, f"{LEFT_AT}\ntangent = [0, 1, 0]", "hands.left.tangent", "across the normal"
+        LEFT_AT,
+        f"{LEFT_AT}\ntangent = [0, 1, 0]",
+        "hands.left.tangent",
+        "perpendicular to the",
     ),
     "contact off the surface": Broken(
         LEFT_AT, "point_m = [0, 0.15, 0]", "hands.left.point_m", "the nearest being [0, 0.1, 0]"
@@ -130,7 +133,7 @@ BROKEN = {
         "friction = { mu = 0.4 }", "", "environment.table", "mu = 0.3"
     ),
     "name twice": Broken("[hands.right]", "[hands.edge_left]", "edge_left", "no hand has"),
-    "name of the object": Broken("[environment.table]", "[environment.box]", "box", "has not"),
+    "name of the object": Broken("[environment.table]", "[environment.box]", "box", "does not use"),
     "name with a space": Broken("[hands.left]", '[hands."le ft"]', "le ft", "a name of letters"),
     "missing mesh": Broken(
         f'shape = "box"\n{BOX_SIZE}', 'shape = "mesh"\nfile = "a.stl"', "object.file", "that exists"
@@ -158,7 +161,7 @@ BROKEN = {
         "[robots.posture_rad]",
         "[robots.posture_deg]\nleft_s0 = 1\n[robots.posture_rad]",
         "posture_rad.left_s0",
-        "in one posture table alone",
+        "in only one posture table",
     ),
     "joint out of range": Broken("left_s0 = -0.06", "left_s0 = -6", "left_s0", "in [-1.7"),
     "wrong mount": Broken('"left_hand_link"', '"left_hand"', "left.mount", "left_hand_link"),

@@ -66,7 +66,7 @@ NAMED = {
     "unknown command": "tilt",
     "unknown flag": "--speed",
     "flag without value": "--duration",
-    "no scenario": "scenario",
+    "no scenario": "SCENARIO",
     "unknown scenario": "box-tilt",
     "duration that is no number": "long",
     "negative duration": "-1.0",

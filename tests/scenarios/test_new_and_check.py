@@ -117,7 +117,7 @@ def test_check_says_of_every_scenario_whether_it_can_be_held(name, folder, capsy
     content = json.loads((folder / name / "check.json").read_text())
     assert content["feasible"] is (code == 0)
     assert (content["explanation"] is None) is (code == 0)
-    assert ("needed alone" in output) is (code == 1)
+    assert ("must change" in output) is (code == 1)
     assert (folder / name / "check.png").read_bytes().startswith(b"\x89PNG")
 
 

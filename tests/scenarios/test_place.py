@@ -129,7 +129,7 @@ def test_a_file_that_says_less_is_caught():
         (["box-tilt", "--out", "placed.txt"], "a file .toml"),
         (["box-tilt", "--out", "nowhere/placed.toml"], "folder that exists"),
         (["box-tilt", "--reach", "-1"], "--reach"),
-        (["box-tilt", "--seconds", "nan"], "effort.seconds"),
+        (["box-tilt", "--seconds", "nan"], "--seconds"),
         (["no-such-scene"], "one of"),
     ],
 )

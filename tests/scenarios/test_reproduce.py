@@ -100,7 +100,7 @@ def test_an_infeasible_tilt_leaves_a_gap_and_no_number():
 
 def test_a_figure_is_a_picture_and_a_table_of_the_same_numbers(tmp_path):
     x = np.linspace(0.0, 90.0, 4)
-    figure = Figure("figure-0", "A line", "force [N]", "caption", (Curve("line", x, 2.0 * x),))
+    figure = Figure("figure-0", "A line", "force [N]", "caption", [Curve("line", x, 2.0 * x)])
     draw(figure, tmp_path)
     assert (tmp_path / "figure-0.png").read_bytes().startswith(b"\x89PNG")
     with (tmp_path / "figure-0.csv").open() as file:

@@ -119,7 +119,7 @@ def story(tmp_path_factory):
     _, errors = driver.communicate(timeout=60)
     kept = [parts_in(out)]
 
-    again = shlex.split(errors.partition("Go on with: ")[2])
+    again = shlex.split(errors.partition("Resume with: ")[2])
     assert again[0] == "fulcrum", errors
     killed = fulcrum(*again[1:])
     wait_for_parts(killed, out, len(kept[0]) + 1)
@@ -189,7 +189,7 @@ def test_progress_counts_episodes_and_failures(story):
 def test_a_finished_sweep_is_one_file_and_not_run_again(story, monkeypatch, capsys):
     assert pq.read_table(story.folder / "episodes.parquet").to_pylist() == story.rows
     monkeypatch.setitem(scenarios(), SCENE.name, SCENE)
-    arguments = shlex.split(story.errors.partition("Go on with: fulcrum ")[2])
+    arguments = shlex.split(story.errors.partition("Resume with: fulcrum ")[2])
     assert main(arguments) == 0
     names = {path.name for path in story.folder.iterdir()}
     assert names == {"config.json", "episodes.parquet", "sweep.json", "map.png"}
