@@ -1,4 +1,4 @@
-"""The controller's belief as models: scene, robot, contacts, object path, statics, inertia."""
+"""Models of the nominal scenario: scene, robots, contacts, object path, statics, inertia."""
 
 from fulcrum.sim.model.collisions import collision_pairs, overlapping_links
 from fulcrum.sim.model.contacts import (

@@ -1,4 +1,4 @@
-"""What links keep clear of: one another, and the scene."""
+"""Pairs of geoms between which collisions are avoided: links, object and environment."""
 
 from __future__ import annotations
 
@@ -12,15 +12,16 @@ from fulcrum.sim.scenario import Scenario
 def collision_pairs(
     scenario: Scenario, model: mujoco.MjModel, data: mujoco.MjData
 ) -> list[tuple[list[str], list[str]]]:
-    """Links against links, object and environment; not the tips against what they touch.
+    """Return the pairs of geom groups to keep apart: links against links, object and environment.
 
-    Left out, as the collision primitives of joint housings overlap by construction: link pairs with
-    at most three joints between them, and those that overlap in the start posture.
+    Not included are tips against what they touch, link pairs with at most three joints between
+    them, and link pairs that overlap in the start posture: the collision primitives of joint
+    housings overlap by construction.
 
     Args:
         scenario: The scene.
-        model: It, compiled.
-        data: Its state in the start posture.
+        model: The compiled scene.
+        data: State of the scene in the start posture.
     """
     pairs = [*unwanted_pairs(scenario, model), *link_pairs(scenario, model, data)]
     return [([first], [second]) for first, second in pairs]
@@ -29,6 +30,6 @@ def collision_pairs(
 def overlapping_links(
     scenario: Scenario, model: mujoco.MjModel, data: mujoco.MjData
 ) -> dict[Names, float]:
-    """The link pairs that :func:`collision_pairs` leaves out as they overlap, and how far [m]."""
+    """Return the overlaps [m] of link pairs that :func:`collision_pairs` leaves out for overlap."""
     every = between_links(scenario, model, data)
     return {pair: -distance for pair, distance in every if not distance > 0.0}

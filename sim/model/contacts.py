@@ -1,4 +1,4 @@
-"""The scenario's contacts as the synthesis and the monitor see them: parameters and frames."""
+"""Contacts of the scenario for synthesis and monitor: parameters and frames."""
 
 from __future__ import annotations
 
@@ -12,12 +12,12 @@ from fulcrum.sim.scenario import Control, Friction, Scenario
 from fulcrum.synthesis import Contact, ContactModel, InvalidInputError, Role
 from fulcrum.synthesis.arrays import Array, Vector
 
-# MuJoCo touches a mesh's convex hull: a contact so far inside it would be made elsewhere [m].
+# Largest depth of a contact inside its mesh's convex hull, which is what MuJoCo touches [m].
 _INSIDE_HULL = 0.001
 
 
 def contacts(scenario: Scenario, control: Control) -> tuple[Contact, ...]:
-    """The contacts as the synthesis sees them: friction scaled down, hands preloaded."""
+    """Return the contacts for the synthesis: friction scaled down, hands preloaded."""
     hands = tuple(
         _contact(h.name, Role.HAND, h.friction, control.friction_factor, control.preload, h.f_n_max)
         for h in scenario.hands
@@ -30,14 +30,14 @@ def contacts(scenario: Scenario, control: Control) -> tuple[Contact, ...]:
 
 
 def true_contacts(scenario: Scenario) -> tuple[Contact, ...]:
-    """The contacts with their full friction and no preload: what the plant is judged by."""
+    """Return the contacts by which the plant is judged: full friction, no preload."""
     return contacts(scenario, Control(friction_factor=1.0, preload=0.0))
 
 
 def shared_places(scenario: Scenario) -> tuple[tuple[int, ...], ...]:
-    """Indices of the supports that hold the same point of the object, for every such point.
+    """Return groups of indices of supports that hold the same point of the object.
 
-    Two surfaces share what holds a point; how, is not for statics to say.
+    Statics does not determine how two surfaces share the force at a point.
     """
     points = [support.p_OP_O for support in scenario.supports]
     first = len(scenario.hands)
@@ -80,34 +80,34 @@ class ContactFrames:
         self.p_OC_O = np.array([h.p_OC_O for h in hands] + [s.p_OP_O for s in supports])
 
     def in_world(self, R_WO: Array) -> Array:
-        """Contact axes in the world, (..., m, 3, 3), for object orientations, (..., 3, 3)."""
+        """Return the contact axes in the world, (..., m, 3, 3), at orientations, (..., 3, 3)."""
         hands = R_WO[..., None, :, :] @ self._R_OC
         supports = np.broadcast_to(self._R_WP, (*R_WO.shape[:-2], *self._R_WP.shape))
         return np.concatenate([hands, supports], axis=-3)
 
     def in_object(self, R_WO: Array) -> Array:
-        """Contact axes in the object's, (m, 3, 3), for an orientation of the object, (3, 3)."""
+        """Return the contact axes in object axes, (m, 3, 3), at an orientation, (3, 3)."""
         return np.concatenate([self._R_OC, R_WO.T @ self._R_WP])
 
     def points(self, R_WO: Array, p_WO: Array) -> Array:
-        """Contact points in the world [m], (m, 3), for a pose of the object."""
+        """Return the contact points in the world [m], (m, 3), at a pose of the object."""
         return p_WO + self.p_OC_O.dot(R_WO.T)
 
 
 def rotations(quaternions: Array) -> Array:
-    """Rotation matrices, (..., 3, 3), of quaternions wxyz, (..., 4)."""
+    """Return the rotation matrices, (..., 3, 3), of quaternions wxyz, (..., 4)."""
     flat = Rotation.from_quat(quaternions.reshape(-1, 4), scalar_first=True).as_matrix()
     return flat.reshape(*quaternions.shape[:-1], 3, 3)
 
 
 def contact_axes(normal: Vector, tangent: Vector) -> Array:
-    """Axes (t, o, n) of a contact as columns, (3, 3), in those of its normal and tangent."""
+    """Return the axes (t, o, n) of a contact as columns, (3, 3), from its normal and tangent."""
     n, t = np.asarray(normal, float), np.asarray(tangent, float)
     return np.column_stack([t, np.cross(n, t), n])
 
 
 def across(vector: Array, normal: Array) -> Array:
-    """The part of a vector that is across a unit normal, made a unit vector, (3,) each."""
+    """Return the unit vector along the part of a vector normal to a unit normal, (3,) each."""
     part = vector - vector.dot(normal) * normal
     return part / np.linalg.norm(part)
 
@@ -117,7 +117,7 @@ def _stack(matrices: list[Array]) -> Array:
 
 
 def check_contacts(scenario: Scenario) -> None:
-    """Refuses contacts in the hollows of a mesh, which MuJoCo would fill.
+    """Refuse contacts in the hollows of a mesh, which are closed by MuJoCo's convex hull.
 
     Raises:
         InvalidInputError: A contact is more than a millimetre inside the convex hull of its geom,

@@ -1,4 +1,4 @@
-"""Hands that share a load across their normals: how they divide it, statics does not say."""
+"""Groups of hands that share a tangential load; statics does not determine their shares."""
 
 from __future__ import annotations
 
@@ -10,27 +10,27 @@ from fulcrum.sim.model.robot_model import RobotModel
 from fulcrum.sim.scenario import Scenario
 from fulcrum.synthesis.arrays import N
 
-# Joints move hands by metres per radian; what is this small is rounding.
+# Relative motion per joint angle below this is rounding [m/rad].
 _STILL = 1e-9
 
 
 def coupled_hands(scenario: Scenario, robot: RobotModel) -> tuple[tuple[int, ...], ...]:
-    """Return groups of hands that no joint moves against each other across their normals.
+    """Return groups of hands that no joint moves tangentially against each other.
 
-    The fingers of a gripper are such a group: their joints press, but the wrist alone carries what
-    acts across. Which finger takes how much of it depends on friction and compliance, not on what
-    is commanded.
+    The fingers of a gripper are such a group: their joints press, and only the wrist carries the
+    tangential load. How the fingers share it depends on friction and compliance, not on the
+    command.
 
     Args:
         scenario: The scene.
-        robot: Its robots.
+        robot: Model of its robots.
     """
     hands = len(scenario.hands)
     R_WO, p_WO = object_path(scenario.path).pose(0.0)
     frames = ContactFrames(scenario)
     normals = frames.in_world(R_WO)[:hands, :, N]
     state = robot.at(np.array([scenario.posture[joint] for joint in robot.joints]))
-    # The hands' motion at one point, in world axes: what is left of a difference is their own.
+    # The hands' motion at one common point, in world axes: differences are relative motion.
     J_W = state.contact_jacobians(np.tile(p_WO, (hands, 1)), np.tile(np.eye(3), (hands, 1, 1)))
     groups: list[list[int]] = []
     for i, normal in enumerate(normals):

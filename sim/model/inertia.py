@@ -14,12 +14,12 @@ from fulcrum.synthesis.arrays import Array
 
 
 def inertial_wrenches(scenario: Scenario, path: ObjectPath, tilt: float) -> tuple[Array, Array]:
-    r"""Wrenches in the object's frame per :math:`\ddot\theta` and :math:`\dot\theta^2`, (6,) each.
+    r"""Return the wrenches, (6,), in the object frame per :math:`\ddot\theta, \dot\theta^2`.
 
     Args:
-        scenario: Whose object is meant.
-        path: Its path.
-        tilt: :math:`\theta` [rad].
+        scenario: Scenario of the object.
+        path: Path of the object.
+        tilt: Tilt :math:`\theta` [rad].
     """
     thing = scenario.object
     center, inertia = np.asarray(thing.center_of_mass), thing.inertia_O

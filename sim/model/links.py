@@ -1,4 +1,4 @@
-"""Links that are not near one another in a chain, and how far apart they are."""
+"""Pairs of links that are not neighbours in a chain, and their distances."""
 
 from __future__ import annotations
 
@@ -10,28 +10,28 @@ from fulcrum.assets.mjcf import LOOKS
 from fulcrum.sim.scenario import Scenario
 
 DETECTION = 0.05
-"""From where links look out for each other and for the scene [m]."""
+"""Distance below which collision avoidance acts on links [m]."""
 
 Names = tuple[str, str]
 
 
 def is_solid(geom: Any) -> bool:
-    """Whether a compiled scene's geom may touch others, rather than only show what a link is."""
+    """Return whether a compiled scene's geom may touch others; otherwise it is only visual."""
     return int(geom.group[0]) != LOOKS
 
 
 def distance(model: mujoco.MjModel, data: mujoco.MjData, first: int, second: int) -> float:
-    """Of two geoms [m], negative if they overlap; beyond :data:`DETECTION` that."""
+    """Return the distance of two geoms [m], at most :data:`DETECTION`; negative in overlap."""
     return mujoco.mj_geomDistance(model, data, first, second, DETECTION, None)
 
 
 def link_pairs(scenario: Scenario, model: mujoco.MjModel, data: mujoco.MjData) -> list[Names]:
-    """Links that must not touch one another: those that are apart in the start posture.
+    """Return the pairs of links that must not touch: those apart in the start posture.
 
     Args:
         scenario: The scene.
-        model: It, compiled.
-        data: Its state in the start posture.
+        model: The compiled scene.
+        data: State of the scene in the start posture.
     """
     return [pair for pair, distance in between_links(scenario, model, data) if distance > 0.0]
 
@@ -39,7 +39,7 @@ def link_pairs(scenario: Scenario, model: mujoco.MjModel, data: mujoco.MjData) -
 def between_links(
     scenario: Scenario, model: mujoco.MjModel, data: mujoco.MjData
 ) -> list[tuple[Names, float]]:
-    """Links that are not near one another in a chain, and their distances [m]."""
+    """Return the pairs of links that are not neighbours in a chain, and their distances [m]."""
     surroundings = [g.name for g in (*scenario.object.geoms, *scenario.environment)]
     names = [g.name for g in map(model.geom, range(model.ngeom)) if is_solid(g)]
     links = [name for name in names if name not in surroundings]
@@ -58,7 +58,7 @@ def between_links(
 
 
 def _ancestors(model: mujoco.MjModel, body: int) -> list[int]:
-    """The body and the next three that a joint carries it on, each by its weld group."""
+    """Return the weld groups of a body and of the next three bodies up its chain of joints."""
     weld, parent = model.body_weldid, model.body_parentid
     chain = [int(weld[body])]
     for _ in range(3):

@@ -1,4 +1,4 @@
-"""The object's path as a function of the tilt, whatever it was given as; and its timing."""
+"""The object's path as a function of the tilt, from a screw or poses; minimum-jerk timing."""
 
 from __future__ import annotations
 
@@ -13,15 +13,15 @@ from fulcrum.sim.scenario import Pivot, Poses, Scenario
 from fulcrum.synthesis import InvalidInputError
 from fulcrum.synthesis.arrays import Array
 
-# A list of poses is looked at in these steps: where a measured orientation is, whether supports
-# stay [rad].
+# Step of the samples of a path through poses, for tilts of measured orientations and for checks
+# of supports [rad].
 _STEP = np.radians(0.5)
-# How far a support may be from where it stood while forces count on friction that holds it [m].
+# Largest displacement of a support; its forces are those of sticking friction [m].
 _STAYS = 1e-4
-# Steps from the nearest sample of the path to its nearest point; each squares what is left.
+# Newton steps from the nearest sample to the nearest point of the path; each squares the error.
 _REFINEMENTS = 4
-# Two places on the path whose orientations differ by less than this share of the tilt between them
-# cannot be told apart well.
+# Least angle between the orientations of two places on the path, as a share of the tilt between
+# them; below it a measured orientation does not determine the place.
 _APART = 0.5
 _NO_SLOPE = np.zeros(3)
 _NO_SLOPE.setflags(write=False)
@@ -38,41 +38,48 @@ class ObjectPath(ABC):
 
     @abstractmethod
     def pose(self, tilt: float) -> tuple[Array, Array]:
-        """Orientation, (3, 3), and position [m], (3,), of the object at a tilt [rad]."""
+        """Return orientation, (3, 3), and position [m], (3,), of the object at a tilt [rad]."""
 
     @abstractmethod
     def derivatives(self, tilt: float, p_O: Array) -> tuple[Array, Array]:
-        """First and second derivatives by tilt [m/rad, m/rad^2], (3,) each, of a point's place.
+        """Return the derivatives of a point's place by tilt [m/rad, m/rad^2], (3,) each.
 
         Args:
-            tilt: [rad].
-            p_O: The point in the object frame [m], (3,).
+            tilt: Tilt [rad].
+            p_O: Point in the object frame [m], (3,).
         """
 
     @abstractmethod
     def axis(self, tilt: Array | float) -> Array:
-        """Angular velocity per rate of the tilt, in the world, (..., 3), at tilts, (...)."""
+        """Return the angular velocity per tilt rate, (..., 3), in the world, at tilts, (...)."""
 
     @abstractmethod
     def axis_slope(self, tilt: float) -> Array:
-        """Its derivative by the tilt [1/rad], (3,)."""
+        """Return the derivative of :meth:`axis` by the tilt [1/rad], (3,)."""
 
     @abstractmethod
     def tilt(self, quat_WO: Array) -> Array:
-        """Tilt [rad] of measured orientations, (..., 4) wxyz."""
+        """Return the tilts [rad] of measured orientations, (..., 4) wxyz."""
 
     @abstractmethod
     def carry(
         self, before: float, after: float, p_WO: Array, quat_WO: Array
     ) -> tuple[Array, Array]:
-        """A pose near the path at one tilt, moved as the path moves to another [rad]."""
+        """Return a pose near the path at a tilt [rad], moved as the path moves to another tilt.
+
+        Args:
+            before: Tilt of the given pose [rad].
+            after: Tilt of the returned pose [rad].
+            p_WO: Position of the object [m], (3,).
+            quat_WO: Orientation of the object, (4,), wxyz.
+        """
 
 
 def object_path(path: Pivot | Poses) -> ObjectPath:
-    """The path that is meant.
+    """Return the path of a scenario as a function of the tilt.
 
     Raises:
-        InvalidInputError: It cannot be followed.
+        InvalidInputError: Measured orientations do not determine the place on the path.
     """
     return ScrewPath(path) if isinstance(path, Pivot) else PosesPath(path)
 
@@ -80,13 +87,13 @@ def object_path(path: Pivot | Poses) -> ObjectPath:
 class ScrewPath(ObjectPath):
     r"""Poses of the object along :math:`X_{WO}(\theta) = e^{[S]\theta} X_{WO}(0)`.
 
-    S is the screw with the path's axis, point and pitch; the tilt :math:`\theta` is its angle. A
-    travel, which lifts the object off while it turns, is added in proportion to the tilt.
+    S is the screw with the path's axis, point and pitch; the tilt :math:`\theta` is its angle. The
+    travel is added in proportion to the tilt; it lifts the object off while it turns.
 
     Attributes:
-        direction: Direction of the axis in the world, (3,), of length 1.
-        point: A point on it [m], (3,).
-        advance: Translation that goes with the turn [m/rad], (3,).
+        direction: Unit vector along the axis in the world, (3,).
+        point: A point on the axis in the world [m], (3,).
+        advance: Translation per tilt, from pitch and travel [m/rad], (3,).
         end: Tilt at the end [rad].
     """
 
@@ -94,11 +101,11 @@ class ScrewPath(ObjectPath):
         self.direction = np.asarray(pivot.axis_W, float) / float(np.linalg.norm(pivot.axis_W))
         self.end = float(np.radians(pivot.angle_deg))
         self.point = np.asarray(pivot.point_W, float)
-        # Translation per radian on top of the turn [m].
+        # Additional translation per tilt [m/rad].
         self.advance = pivot.pitch * self.direction + np.asarray(pivot.travel, float) / self.end
         self._R_WO = pivot.start.rotation
-        # With q_0 the start, q times the inverse of q_0 has the real part cos(tilt / 2) and, along
-        # the axis, the part sin(tilt / 2): both are linear in q, with these rows.
+        # With q_0 the start, q times the inverse of q_0 has the real part cos(tilt / 2), and along
+        # the axis the part sin(tilt / 2). Both are linear in q, with these rows.
         q_0 = self._R_WO.as_quat(scalar_first=True)
         w, v = q_0[0], q_0[1:]
         sine = np.concatenate(
@@ -121,22 +128,22 @@ class ScrewPath(ObjectPath):
         return turning + self.advance, np.cross(self.direction, turning)
 
     def axis(self, tilt: Array | float) -> Array:
-        """See :meth:`ObjectPath.axis`: the same everywhere."""
-        if isinstance(tilt, float):  # every tick, and many times cheaper
+        """See :meth:`ObjectPath.axis`; it is constant."""
+        if isinstance(tilt, float):  # called every tick; many times faster
             return self.direction
         return np.broadcast_to(self.direction, (*np.shape(tilt), 3))
 
     def axis_slope(self, tilt: float) -> Array:
-        """See :meth:`ObjectPath.axis_slope`: zero."""
+        """See :meth:`ObjectPath.axis_slope`; it is zero."""
         return _NO_SLOPE
 
     def tilt(self, quat_WO: Array) -> Array:
-        """Tilt [rad] of measured orientations, (..., 4) wxyz: their twist about the axis.
+        """Return the twist about the axis [rad] of measured orientations, (..., 4) wxyz.
 
         The twist is the part of the rotation from the start that is about the axis, in
-        [-pi, pi); what is left, the swing, does not count as tilt.
+        [-pi, pi). The rest, the swing, does not count as tilt.
         """
-        # Sums, not a product of matrices, whose rounding depends on how many rows there are.
+        # Sums instead of a matrix product, whose rounding depends on the number of rows.
         cosine, sine = ((quat_WO * row).sum(axis=-1) for row in self._half_tilt)
         return np.mod(2.0 * np.arctan2(sine, cosine) + np.pi, 2.0 * np.pi) - np.pi
 
@@ -145,7 +152,7 @@ class ScrewPath(ObjectPath):
     ) -> tuple[Array, Array]:
         """See :meth:`ObjectPath.carry`."""
         turn = quaternion.about(self.direction, after - before)
-        # The axis travels with the object.
+        # The travel moves the axis along with the object.
         point = self.point + before * self.advance
         arm = quaternion.rotated(turn, p_WO - point)
         return self.point + after * self.advance + arm, quaternion.product(turn, quat_WO)
@@ -154,14 +161,14 @@ class ScrewPath(ObjectPath):
 class PosesPath(ObjectPath):
     """A smooth path through poses.
 
-    The orientation follows a rotation spline, with continuous angular acceleration, and the point
-    of the object that keeps its place best a cubic one: what turns about a fixed place in its list
-    of poses does so in between, and poses on a screw give that screw. Beyond its ends the path goes
-    on as a screw.
+    The orientation follows a rotation spline with continuous angular acceleration. The point of
+    the object that moves least (:attr:`Poses.pivot_O`) follows a cubic spline. So poses about a
+    fixed point give a motion about that point, and poses on a screw give that screw. Beyond its
+    ends the path continues as a screw.
     """
 
     def __init__(self, poses: Poses) -> None:
-        """Takes the poses.
+        """Fit the path to the poses.
 
         Raises:
             InvalidInputError: Different parts of the path have nearly the same orientation.
@@ -178,7 +185,7 @@ class PosesPath(ObjectPath):
         self._grid = np.linspace(0.0, self.end, 2 + int(self.end / _STEP))
         self._quats = self._turns(self._grid).as_quat(scalar_first=True)
         self._check()
-        # The same finely tabulated, to 1e-8 rad and m, in a tenth of the time; signs follow suit.
+        # A fine table, accurate to 1e-8 rad and m and ten times as fast; signs are continuous.
         signs = np.cumprod(np.sign([1.0, *(self._quats[1:] * self._quats[:-1]).sum(axis=1)]))
         rows = np.column_stack([signs[:, None] * self._quats, self._places(self._grid)])
         self._table = CubicSpline(self._grid, rows)
@@ -200,7 +207,7 @@ class PosesPath(ObjectPath):
         return R_WO, place - R_WO @ self._pivot_O
 
     def _turn(self, tilt: float) -> tuple[Array, Array, Array]:
-        """Orientation and, in the world, its angular velocity and acceleration per tilt."""
+        """Return orientation, angular velocity and acceleration per tilt, in the world."""
         inside = min(max(tilt, 0.0), self.end)
         R_WO = self._turns(inside).as_matrix()
         omega = R_WO @ self._turns(inside, 1)
@@ -210,7 +217,7 @@ class PosesPath(ObjectPath):
         return beyond.as_matrix() @ R_WO, omega, np.zeros(3)
 
     def _place(self, tilt: float) -> tuple[Array, Array, Array]:
-        """Place of the pivot's point in the world, and its derivatives."""
+        """Return the place of the pivot point in the world, and its derivatives by tilt."""
         inside = min(max(tilt, 0.0), self.end)
         place, slope = self._places(inside), self._places(inside, 1)
         if inside == tilt:
@@ -236,20 +243,20 @@ class PosesPath(ObjectPath):
         return self._turn(tilt)[2]
 
     def tilt(self, quat_WO: Array) -> Array:
-        """Tilt [rad] of measured orientations, (..., 4) wxyz: the nearest point of the path.
+        """Return the tilts [rad] on the path nearest to measured orientations, (..., 4) wxyz.
 
-        Beyond the ends it goes on with the turn about the axis there.
+        Beyond the ends the tilt is the turn about the axis at that end.
         """
         q = np.reshape(quat_WO, (-1, 4))
         measured = Rotation.from_quat(q, scalar_first=True)
-        # Sums, not a product of matrices, whose rounding depends on how many rows there are.
+        # Sums instead of a matrix product, whose rounding depends on the number of rows.
         near = np.abs((q[:, None] * self._quats).sum(axis=-1)).argmax(axis=1)
         tilt = self._grid[near]
         for _ in range(_REFINEMENTS):
             inside = np.clip(tilt, 0.0, self.end)
             rate = self._turns(inside, 1)
             there = self._turns(inside) * Rotation.from_rotvec((tilt - inside)[:, None] * rate)
-            # What is missing, in the object's axes there, as the rate is.
+            # The remaining turn, in the object's axes at that tilt, as is the rate.
             missing = (there.inv() * measured).as_rotvec()
             tilt = tilt + (missing * rate).sum(axis=1) / (rate * rate).sum(axis=1)
         return tilt.reshape(np.shape(quat_WO)[:-1])
@@ -266,10 +273,10 @@ class PosesPath(ObjectPath):
 
 
 def check_supports(scenario: Scenario) -> None:
-    """Refuses a list of poses that moves a support, whose forces count on friction that holds it.
+    """Refuse a list of poses that moves a support; its forces are those of sticking friction.
 
     Raises:
-        InvalidInputError: One is more than 0.1 mm from where it stood at the start.
+        InvalidInputError: A support moves by more than 0.1 mm from its start.
     """
     if not isinstance(scenario.path, Poses):
         return
@@ -287,9 +294,7 @@ def check_supports(scenario: Scenario) -> None:
 
 
 def minimum_jerk(x: Array | float) -> tuple[Array, Array, Array]:
-    """Position, velocity, acceleration of the minimum-jerk profile from 0 to 1 over x in [0, 1].
-
-    x is clipped.
+    """Return the minimum-jerk profile from 0 to 1, and its derivatives, at x clipped to [0, 1].
 
     Source: Flash and Hogan 1985, the polynomial 10 x^3 - 15 x^4 + 6 x^5.
     """

@@ -1,7 +1,7 @@
-"""The controller's belief about the robots: a Pinocchio model of their arms, hands and limits.
+"""The controller's model of the robots: arms, hands and limits in Pinocchio.
 
-The model is read off the nominal scene, so that hands, locked joints and the robots' places need no
-second description; that they are the official robots is tested against the official URDF.
+The model is read from the nominal scene, so hands, locked joints and the robots' bases need no
+second description. A test compares the robots with their official URDF.
 """
 
 from __future__ import annotations
@@ -24,12 +24,12 @@ class RobotModel:
 
     Attributes:
         joints: Names of the l driven joints.
-        q_min, q_max: Joint ranges [rad or m], (l,).
+        q_min, q_max: Limits of the joint angles [rad or m], (l,).
         qd_max: Speed limits [rad/s or m/s], (l,).
         tau_min, tau_max: Torque limits [N·m or N], (l,).
         damping: Viscous joint friction [N·m·s/rad], (l,).
         start_deviation: Standard deviation of the start posture [rad or m], (l,).
-        tip_radii: Of the hands' tips [m], (n,).
+        tip_radii: Radii of the hands' tips [m], (n,).
     """
 
     def __init__(self, scenario: Scenario) -> None:
@@ -46,17 +46,17 @@ class RobotModel:
         self.start_deviation = np.array([scenario.start_deviation[name] for name in self.joints])
 
         self._model = pinocchio_model(scene)
-        # Pinocchio may order joints otherwise; every vector here is in the order of the motors.
+        # Pinocchio may order joints differently; every vector here is in the order of the motors.
         order = [self._model.joints[self._model.getJointId(name)].idx_v for name in self.joints]
         self._order = np.array(order)
-        # Where in Pinocchio's mass matrix, of which only the upper triangle counts, ours is.
+        # Indices into Pinocchio's mass matrix, of which only the upper triangle is valid.
         first, second = np.minimum.outer(order, order), np.maximum.outer(order, order)
         self._mass_entries = first * self._model.nv + second
         tips = [self._frame(tip_site(hand)) for hand in scenario.hands]
         self._tip_joints = [int(self._model.frames[tip].parentJoint) for tip in tips]
         self._tip_places = [self._model.frames[tip].placement.translation.copy() for tip in tips]
         self.tip_radii = np.array([scene.geom(tip_geom(h)).size[0] for h in scenario.hands])
-        # Pinocchio's work space for motion, and those of states that nobody holds any more.
+        # Pinocchio's work space for motion, and the free ones, of states no longer in use.
         self._moving = self._model.createData()
         self._spare: list[pin.Data] = []
 
@@ -67,16 +67,16 @@ class RobotModel:
         return int(self._model.getFrameId(name))
 
     def at(self, q: Array) -> RobotState:
-        """Return the robots at joint angles [rad or m], (l,)."""
+        """Return the robots at joint angles q [rad or m], (l,)."""
         return RobotState(self, q)
 
 
 class RobotState:
-    """The robots at one posture; nothing about it changes later.
+    """The robots at one posture; immutable.
 
     Attributes:
-        robot: Whose state it is.
-        tau_g: Torque that holds the robots up against gravity [N·m or N], (l,).
+        robot: Model of the robots.
+        tau_g: Torques that balance gravity [N·m or N], (l,).
     """
 
     __slots__ = ("_data", "_q", "robot", "tau_g")
@@ -84,7 +84,7 @@ class RobotState:
     def __init__(self, robot: RobotModel, q: Array) -> None:
         self.robot = robot
         model, order = robot._model, robot._order
-        # A new work space of Pinocchio takes longer than all that is computed in it.
+        # Making a new work space of Pinocchio takes longer than the computations in it.
         self._data = robot._spare.pop() if robot._spare else model.createData()
         self._q = np.zeros(model.nq)
         self._q[order] = q
@@ -106,11 +106,11 @@ class RobotState:
         return pin.crba(robot._model, self._data, self._q).take(robot._mass_entries)
 
     def inertial_torques(self, slope: Array, curvature: Array) -> tuple[Array, Array]:
-        r"""Return what motion along joint angles q(s) costs.
+        r"""Return the torques for motion along joint angles q(s).
 
         Args:
-            slope: q' [rad or m], (l,).
-            curvature: q'', (l,).
+            slope: First derivative q' [rad or m], (l,).
+            curvature: Second derivative q'' [rad or m], (l,).
 
         Returns:
             :math:`M q'` and :math:`M q'' + C(q, q') q'`, (l,) each: torques per :math:`\ddot s` and
@@ -135,12 +135,13 @@ class RobotState:
             R_WC: Contact axes in the world, (n, 3, 3).
 
         Returns:
-            (n, 6, l): twist, linear part first, of the point of each hand that is at its contact.
+            Twists, linear part first, of the hands' points at their contacts per joint speed,
+                (n, 6, l).
         """
         robot, data = self.robot, self._data
         J_C = np.empty((len(robot._tip_joints), 6, len(robot.joints)))
         for i, joint in enumerate(robot._tip_joints):
-            # The contact as a frame that the tip's joint carries along.
+            # The contact as a frame fixed to the tip's joint.
             X_JC = data.oMi[joint].actInv(pin.SE3(R_WC[i], p_WC[i]))
             J = pin.getFrameJacobian(robot._model, data, joint, X_JC, pin.ReferenceFrame.LOCAL)
             J.take(robot._order, axis=1, out=J_C[i], mode="clip")
@@ -159,9 +160,9 @@ class RobotState:
 
 
 def pinocchio_model(scene: mujoco.MjModel) -> pin.Model:
-    """Pinocchio model of all bodies of a compiled scene that hang on hinges and slides.
+    """Return a Pinocchio model of all bodies of a compiled scene on hinges and slides.
 
-    Bodies with a free joint (the object) are left out. Sites become frames of their names.
+    Bodies with a free joint (the object) are left out. Sites become frames of the same names.
 
     Raises:
         InvalidInputError: A joint is neither a hinge nor a slide.

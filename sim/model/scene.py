@@ -22,7 +22,7 @@ from fulcrum.sim.scenario import ContactMaterial, Friction, Hand, Robot, Scenari
 from fulcrum.synthesis import InvalidInputError
 from fulcrum.synthesis.arrays import Array
 
-# Solver tolerance of both the main and the noslip solver; tight, for runs are compared bit by bit.
+# Tolerance of the main and the noslip solver; tight, since runs are compared bit by bit.
 _SOLVER_TOLERANCE = 1e-10
 
 _GEOM_TYPES = {
@@ -32,14 +32,14 @@ _GEOM_TYPES = {
 
 
 class ObjectMotion(StrEnum):
-    """Whether physics moves the object, or whoever poses it (inverse kinematics)."""
+    """How the object moves: freely by physics, or posed by the caller (inverse kinematics)."""
 
     FREE = "free"
     POSED = "posed"
 
 
 def compose(scenario: Scenario, motion: ObjectMotion = ObjectMotion.FREE) -> mujoco.MjSpec:
-    """The scene as an editable specification.
+    """Return the scene as an editable specification.
 
     Raises:
         InvalidInputError: The scenario names a joint, mount, part of a hand or geom type that does
@@ -80,22 +80,25 @@ def _compiled(spec: mujoco.MjSpec) -> mujoco.MjModel:
 
 
 def hand_body(hand: Hand) -> str:
-    """Name of the body of a hand."""
+    """Return the name of the body of a hand."""
     return f"{hand.name}_pad"
 
 
 def tip_geom(hand: Hand) -> str:
-    """Name of the geom with which a hand touches."""
+    """Return the name of the geom with which a hand touches."""
     return f"{hand.name}_tip"
 
 
 def tip_site(hand: Hand) -> str:
-    """Name of the site at the centre of a hand's tip."""
+    """Return the name of the site at the centre of a hand's tip."""
     return f"{hand.name}_tip_center"
 
 
 def unwanted_pairs(scenario: Scenario, scene: mujoco.MjModel) -> list[tuple[str, str]]:
-    """Pairs of geoms that must not touch: moving links against solid object and environment."""
+    """Return the pairs of moving links and solid geoms of object or environment, by name.
+
+    These must not touch.
+    """
     surroundings = {g.name: g for g in (*scenario.object.geoms, *scenario.environment)}
     touching = {(tip_geom(hand), hand.geom) for hand in scenario.hands}
     geoms = [scene.geom(g) for g in range(scene.ngeom)]
@@ -109,9 +112,9 @@ def unwanted_pairs(scenario: Scenario, scene: mujoco.MjModel) -> list[tuple[str,
 
 
 def object_pairs(scenario: Scenario) -> list[tuple[str, str]]:
-    """Pairs of the object's geoms and the environment's that must not touch.
+    """Return the pairs of geoms of object and environment that must not touch, by name.
 
-    Where the object may rest is named, by supports and rests, as a surface for all of its geoms.
+    A surface that a support or rest names may be touched by all geoms of the object.
     """
     named = {s.surface for s in scenario.supports} | {r.surface for r in scenario.rests}
     return [
@@ -124,13 +127,13 @@ def object_pairs(scenario: Scenario) -> list[tuple[str, str]]:
 
 
 def joint_ranges(scene: mujoco.MjModel) -> NDArray[np.float64]:
-    """(njnt, 2) lower and upper limits of a scene's joints [rad or m]; infinite without limits."""
+    """Return lower and upper joint limits [rad or m], (njnt, 2); infinite where there are none."""
     limited = scene.jnt_limited[:, None].astype(bool)
     return np.where(limited, scene.jnt_range, [-np.inf, np.inf])
 
 
 def object_bounds(scenario: Scenario, scene: mujoco.MjModel) -> tuple[Array, Array]:
-    """Return opposite corners of the bounds of the object's geoms, in the object frame [m]."""
+    """Return two opposite corners, (3,), of the object's bounding box in its frame [m]."""
     corners = []
     for name in (geom.name for geom in scenario.object.geoms):
         geom = scene.geom(name)
@@ -156,12 +159,12 @@ def _set_options(spec: mujoco.MjSpec, scenario: Scenario) -> None:
 
 
 def _robots(scenario: Scenario) -> mujoco.MjSpec:
-    """All robots; MuJoCo attaches under a prefix only, so those that have one join the other."""
+    """Return the specification of all robots, those with a prefix attached to the one without."""
     spec = mujoco.MjSpec()
     for robot in sorted(scenario.robots, key=lambda robot: robot.prefix != ""):
         own = _robot(robot)
         if robot.prefix:
-            own.default.name = "robot"  # the main defaults of hands are called "main", too
+            own.default.name = "robot"  # the default class of hands has the name "main", too
             spec.attach(own, prefix=robot.prefix, frame=spec.worldbody.add_frame())
         else:
             spec = own
@@ -169,7 +172,7 @@ def _robots(scenario: Scenario) -> mujoco.MjSpec:
 
 
 def _robot(robot: Robot) -> mujoco.MjSpec:
-    """One robot at its base, with motors at the driven joints and the others locked."""
+    """Return one robot at its base, with motors at the driven joints and the others locked."""
     spec = _read(f"{robot.label}.model", robot_spec, robot.model)
     _check_joints(spec, robot)
     for actuator in list(spec.actuators):
@@ -215,7 +218,7 @@ def _read(field: str, read: Callable[[str], mujoco.MjSpec], model: str) -> mujoc
 
 
 def _check_joints(spec: mujoco.MjSpec, robot: Robot) -> None:
-    """Refuses joints that do not exist, and start angles outside a joint's range."""
+    """Refuse joints that do not exist, and start angles outside a joint's range."""
     model = spec.copy().compile()
     known = [name for j in range(model.njnt) if (name := model.joint(j).name)]
     for field in ("posture", "torque_limits", "speed_limits"):
@@ -284,14 +287,16 @@ def _add_object(spec: mujoco.MjSpec, scenario: Scenario, motion: ObjectMotion) -
 
 
 def pair_materials(scenario: Scenario) -> dict[str, ContactMaterial]:
-    """Materials of the pairs that are to touch, by the pair's name."""
+    """Return the materials of the pairs that may touch, by the pair's name."""
     return {_pair_name(*pair): material for pair, (_, material) in _wanted_pairs(scenario).items()}
 
 
 def _wanted_pairs(
     scenario: Scenario,
 ) -> dict[tuple[str, str], tuple[Friction, ContactMaterial]]:
-    """Pairs of geoms that are to touch, the hand's or the surface's first, and how they do.
+    """Return friction and material of each pair of geoms that may touch.
+
+    The geom of the hand or of the surface is the first of its pair.
 
     Raises:
         InvalidInputError: Contacts of the same pair contradict each other.
@@ -315,9 +320,10 @@ def _pair_name(first: str, second: str) -> str:
 
 
 def _add_pairs(spec: mujoco.MjSpec, scenario: Scenario) -> None:
-    """Explicit pairs: without them friction is the larger of the two geoms'.
+    """Add contact pairs with the scenario's friction.
 
-    An elliptic cone with condim 4 is exactly SFCE, (2) of the paper; with condim 3 PCWF, (1).
+    Without a pair, MuJoCo uses the larger friction of the two geoms. An elliptic cone with condim 4
+    is exactly SFCE, (2) of the paper; with condim 3 it is PCWF, (1).
     """
     for (first, second), (friction, _) in _wanted_pairs(scenario).items():
         torsion = 0.0 if friction.e_n is None else friction.mu * friction.e_n
@@ -331,7 +337,7 @@ def _add_pairs(spec: mujoco.MjSpec, scenario: Scenario) -> None:
 
 
 def _add_view(spec: mujoco.MjSpec, scenario: Scenario) -> None:
-    """Lights and a camera on the scene for MuJoCo's own viewer."""
+    """Add lights and a camera for MuJoCo's own viewer."""
     spec.worldbody.add_light(pos=[0.0, -1.5, 2.5], dir=[0.2, 0.6, -1.0])
     spec.worldbody.add_light(pos=[1.5, 1.5, 2.5], dir=[-0.4, -0.5, -1.0])
     spec.stat.center = scenario.path.point_W

@@ -1,4 +1,4 @@
-"""From a measured state to the contact force synthesis problem, through the controller's belief."""
+"""The contact force synthesis problem at a measured state, from the controller's models."""
 
 from __future__ import annotations
 
@@ -14,17 +14,17 @@ from fulcrum.synthesis.arrays import Array
 from fulcrum.synthesis.contact import skew
 from fulcrum.synthesis.problem import Gravity
 
-# Contacts are made once for each of these steps, with the largest grip within each [deg].
+# Step of the tilt for which contacts are prepared, with the largest grip within the step [deg].
 _GRIP_STEP_DEG = 0.5
-# Grips that differ by less are the same [N].
+# Differences of grip below this are solver noise [N].
 _SAME_GRIP = 1e-4
-# Quaternions that are nearer to length 1 are as their source made them: their rotation matrices
-# are off by as much [-].
+# Largest deviation of a quaternion's squared length from 1 that is not normalised away [-]; the
+# rotation matrix has an error of the same size.
 _UNIT_LENGTH = 1e-9
 
 
 class Statics:
-    """The scenario's nominal object, contacts and robot as problems of the form (17)."""
+    """Problems of the form (17) for the scenario's nominal object, contacts and robots."""
 
     def __init__(
         self,
@@ -32,12 +32,12 @@ class Statics:
         control: Control,
         grip: GripSchedule | None = None,
     ) -> None:
-        """Takes over the nominal scenario.
+        """Prepare the contacts of the nominal scenario.
 
         Args:
             scenario: The scene.
-            control: What the synthesis is told.
-            grip: The least normal forces of the hands; the control's preload if left out.
+            control: Settings of the synthesis: friction factor, preload, objective.
+            grip: Least normal forces of the hands; the control's preload if left out.
         """
         self._objective = control.objective
         nominal, end = contacts(scenario, control), np.radians(scenario.path.angle_deg)
@@ -47,7 +47,7 @@ class Statics:
             half = 0.5 * end / (len(tilts) - 1)
             most = np.array([grip.largest(tilt - half, tilt + half) for tilt in tilts.tolist()])
             middle = grip.at(tilts)
-            # A difference within the solver's noise is none.
+            # Differences within the solver's noise are ignored.
             rows = np.where(grip.least & (most > middle + _SAME_GRIP), most, middle)
             self._contacts = [pressed(nominal, f_n) for f_n in rows]
         self._rows_per_rad = (len(self._contacts) - 1) / end
@@ -55,7 +55,7 @@ class Statics:
         self._hands = len(scenario.hands)
         self._weight_W = np.array([0.0, 0.0, -scenario.object.mass * GRAVITY])
         center_O = np.asarray(scenario.object.center_of_mass)
-        # Stacked over the moment about the object frame: the wrench of a force at the centre.
+        # Maps a force at the centre of mass to its wrench about the object frame.
         self._at_center = np.vstack([np.eye(3), skew(center_O)])
 
     def problem(
@@ -66,8 +66,8 @@ class Statics:
         Args:
             robot: The robots at their joint angles; without them the problem has no joints.
             p_WO: Position of the object [m], (3,).
-            quat_WO: Its orientation, (4,), wxyz; of any length, for trackers round their numbers.
-            tilt: Where it should be on the path [rad]: what the least grip depends on.
+            quat_WO: Orientation of the object, (4,), wxyz, of any length > 0: trackers round it.
+            tilt: Reference tilt [rad], which selects the least grip.
         """
         row = round(min(max(tilt * self._rows_per_rad, 0.0), len(self._contacts) - 1.0))
         if abs(quat_WO.dot(quat_WO) - 1.0) > _UNIT_LENGTH:
@@ -87,7 +87,7 @@ class Statics:
 
 
 def gravity(thing: Object, R_WO: Array) -> Gravity:
-    """The weight of an object at an orientation, (3, 3), in the object's axes."""
+    """Return the weight of an object at an orientation, (3, 3), in the object's axes."""
     return Gravity(
         weight=thing.mass * GRAVITY,
         direction_O=R_WO.T @ np.array([0.0, 0.0, -1.0]),
