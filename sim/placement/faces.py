@@ -57,7 +57,7 @@ class Faces:
 
     @property
     def shares(self) -> tuple[float, float]:
-        """Return the present coordinates as shares of their ranges [-]."""
+        """The present coordinates as shares of their ranges [-]."""
         u, v = (
             (now - low) / (high - low) if high > low else 0.5
             for now, (low, high) in zip(self.now, self.ranges[0], strict=True)

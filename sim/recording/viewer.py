@@ -34,7 +34,7 @@ _SETTLED_S, _DEADLINE_S, _PAINT_S = 1.5, 20.0, 0.5
 
 
 class ViewerError(FulcrumError):
-    """An error: the viewer cannot show the recording on this machine."""
+    """The viewer cannot show the recording on this machine."""
 
 
 def recording_file(run: Path) -> Path:

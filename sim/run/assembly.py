@@ -23,7 +23,7 @@ def closed_loop(
     """Return a loop that is ready to run.
 
     Args:
-        scenario: Scenario as the controller believes it to be.
+        scenario: Scenario that the controller assumes.
         control: Settings of the controller.
         prepared: Result of :func:`prepare` for both; computed here without checks if left out.
         world: Deviations and disturbances of the plant; none by default.

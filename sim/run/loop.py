@@ -44,7 +44,7 @@ class ClosedLoop:
         """Put plant and controller at the start.
 
         Args:
-            scenario: Scenario as the controller believes it to be.
+            scenario: Scenario that the controller assumes.
             robot: Model of the robots that the controller uses.
             truth: True scenario, as the plant has it.
             plant: Plant that is controlled.

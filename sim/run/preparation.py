@@ -23,7 +23,7 @@ _CHECK_DEG = 5.0
 
 
 class UnholdableError(FulcrumError):
-    """An error: no forces hold the object somewhere on the path; nothing has moved."""
+    """No forces hold the object somewhere on the path; nothing has moved."""
 
     def __init__(self, explanation: Explanation) -> None:
         self.explanation = explanation
@@ -35,9 +35,9 @@ class UnholdableError(FulcrumError):
 
 @dataclass(frozen=True, eq=False)
 class Preparation:
-    """The plans of a run, which depend only on the controller and on the scenario it believes in.
+    """The plans of a run; runs in different worlds can share them.
 
-    Runs in different worlds can share them.
+    They depend only on the controller and the scenario that it assumes.
 
     Attributes:
         robot: Model of the robots that the controller uses.
@@ -64,7 +64,7 @@ def prepare(
     """Plan a run.
 
     Args:
-        scenario: Scenario as the controller believes it to be.
+        scenario: Scenario that the controller assumes.
         control: Settings of the controller.
         best_effort: Whether to go on although a certificate proves that no forces exist at a tilt.
         joint_path: Joint path of the scenario; planned here if left out.

@@ -1,4 +1,4 @@
-"""Preloaded by Dask into each worker of a local cluster, so that only the driver handles Ctrl-C."""
+"""Preload of each Dask worker of a local cluster: only the driver handles Ctrl-C."""
 
 from __future__ import annotations
 

@@ -47,7 +47,7 @@ class Sweep:
     """A sweep: every controller in every world, judged by the tolerances for disturbed runs.
 
     Attributes:
-        scenario: Scenario as the controllers believe it to be.
+        scenario: Scenario that the controllers assume.
         controllers: Names of the controllers.
         preset: Name of the uncertainty from which worlds are drawn.
         episodes: Number of episodes for each controller and point of the grid.

@@ -27,7 +27,7 @@ SweepProgress = Callable[[int, int, int], None]
 
 
 class LostEpisodesError(FulcrumError):
-    """An error: some episodes ended every worker that tried them; the others are finished."""
+    """Some episodes ended every worker that tried them; the others are finished."""
 
     def __init__(self, names: list[str]) -> None:
         self.names = names
