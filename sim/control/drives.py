@@ -46,7 +46,7 @@ class Drives:
         """Start without contact forces.
 
         Args:
-            scenario: Scenario as the controller believes it to be.
+            scenario: Scenario that the controller assumes.
             control: Settings of the controller.
             robot: Model of the robots.
         """

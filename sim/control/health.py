@@ -53,7 +53,7 @@ class Health:
 
         Args:
             settings: Thresholds.
-            scenario: Scenario as the controller believes it to be.
+            scenario: Scenario that the controller assumes.
             robot: Model of the robots.
             start: Joint positions at the start [rad or m], (l,).
         """

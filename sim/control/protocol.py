@@ -20,7 +20,7 @@ class Controller(Protocol):
         """Begin a run.
 
         Args:
-            scenario: Scenario as the controller believes it to be.
+            scenario: Scenario that the controller assumes.
             robot: Model of the robots.
             seed: Seed of the controller's random numbers.
         """

@@ -1,4 +1,4 @@
-"""Where to stand and where to hold: a search over bases, contacts and postures."""
+"""Placements of robots and hands: a search over bases, contacts and start postures."""
 
 from fulcrum.sim.placement.faces import coordinates
 from fulcrum.sim.placement.freedom import Freedom

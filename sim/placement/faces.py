@@ -1,4 +1,4 @@
-"""Where on an object's faces a hand may hold it, by two coordinates of a face."""
+"""Places on an object's faces at which a hand may hold it, by two coordinates of a face."""
 
 from __future__ import annotations
 
@@ -16,11 +16,11 @@ from fulcrum.synthesis.arrays import Array, Vector
 
 Range = tuple[float, float]
 
-# How far off its face a contact may be, to count as on it [m].
+# Largest distance from a face of a contact that counts as on it [m].
 _ON_FACE = 1e-3
-# Steps in which a face is measured, and in which a contact's coordinates are sought.
+# Numbers of steps for measuring a face, and for finding the coordinates of a contact.
 _MEASURED, _SOUGHT = 64, 32
-# Digits of coordinates: 0.1 mm on a face of a metre.
+# Digits of coordinates: 0.1 mm on a face of one metre.
 _DIGITS = 4
 
 
@@ -29,11 +29,11 @@ class Faces:
     """The faces that a hand may touch.
 
     Attributes:
-        hand: The hand where it is now.
-        shape: The object's.
-        names: Of the faces, that of the present one first.
-        now: Coordinates of the hand's place on that face [-].
-        ranges: Of the coordinates u and v on each face [-], without its border.
+        hand: Hand at its present place.
+        shape: Shape of the object.
+        names: Names of the faces, the present one first.
+        now: Coordinates of the hand's place on the present face [-].
+        ranges: Ranges of the coordinates u and v on each face, without its border [-].
     """
 
     hand: Hand
@@ -43,10 +43,10 @@ class Faces:
     ranges: tuple[tuple[Range, Range], ...]
 
     def held(self, face: float, u: float, v: float) -> Hand:
-        """The hand elsewhere; its axes are turned along with the normal.
+        """Return the hand at another place; its axes are turned along with the normal.
 
         Args:
-            face: Which face, as a share of their number [-]: from 0 on the first, to 1 the last.
+            face: Face, as a share of the number of faces [-]: from 0, the first, to 1, the last.
             u, v: Coordinates, as shares of their ranges [-].
         """
         index = min(int(face * len(self.names)), len(self.names) - 1)
@@ -66,16 +66,16 @@ class Faces:
 
 
 def faces_of(scenario: Scenario, hand: Hand, allowed: tuple[str, ...], border: float) -> Faces:
-    """The faces that a hand may touch.
+    """Return the faces that a hand may touch.
 
     Args:
-        scenario: The scene.
+        scenario: Scene.
         hand: One of its hands.
-        allowed: Names of faces; that on which the hand is may be left out.
-        border: What contacts keep clear of at the ends of a face [m].
+        allowed: Names of faces; the present face of the hand may be left out.
+        border: Distance that contacts keep from the ends of a face [m].
 
     Raises:
-        InvalidInputError: The object is of no shape, has no such face, or the hand is not on it.
+        InvalidInputError: The object has no shape or no such face, or the hand is on no face.
     """
     shape = shape_of(scenario)
     for name in allowed:
@@ -96,10 +96,10 @@ def faces_of(scenario: Scenario, hand: Hand, allowed: tuple[str, ...], border: f
 
 
 def shape_of(scenario: Scenario) -> Shape:
-    """The object's shape.
+    """Return the object's shape.
 
     Raises:
-        InvalidInputError: It has none.
+        InvalidInputError: The object has no shape.
     """
     thing = scenario.object
     if thing.shape is None:
@@ -109,13 +109,13 @@ def shape_of(scenario: Scenario) -> Shape:
 
 
 def moved(hand: Hand, point: Vector, normal: Vector, shape: Shape) -> Hand:
-    """A hand at another place; its tangent is carried along as the normal turns."""
+    """Return a hand at another place; its tangent is rotated along with its normal."""
     if normal == hand.normal_O:
         return replace(hand, p_OC_O=point, geom=shape.touched(hand.geom, point))
     old, new = np.asarray(hand.normal_O, float), np.asarray(normal, float)
     axis, cosine = np.cross(old, new), float(old @ new)
     sine = float(np.linalg.norm(axis))
-    # The normal of the opposite face is reached by a turn about the tangent, which stays.
+    # For the opposite face the rotation is about the tangent, which therefore stays.
     turn = np.zeros(3) if sine < 1e-9 else np.arctan2(sine, cosine) / sine * axis
     tangent = across(Rotation.from_rotvec(turn).apply(hand.tangent_O), new)
     geom = shape.touched(hand.geom, point)
@@ -123,7 +123,7 @@ def moved(hand: Hand, point: Vector, normal: Vector, shape: Shape) -> Hand:
 
 
 def coordinates(shape: Shape, face: str, p_O: Vector) -> tuple[float, float]:
-    """Coordinates of a point of a face: there is no formula for all shapes."""
+    """Return the coordinates of a point of a face, found by search for all shapes."""
 
     def distance(at: Array) -> float:
         u, v = np.clip(at, 0.0, 1.0).tolist()
@@ -138,7 +138,7 @@ def coordinates(shape: Shape, face: str, p_O: Vector) -> tuple[float, float]:
 
 
 def _ranges(shape: Shape, face: str, border: float) -> tuple[Range, Range]:
-    """Ranges of both coordinates, without a border [m] where the face ends."""
+    """Return the ranges of both coordinates, without a border [m] where the face ends."""
     ranges = []
     for k in range(2):
         at = np.full((_MEASURED + 1, 2), 0.5)

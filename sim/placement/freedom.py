@@ -1,4 +1,4 @@
-"""What may move in a placement, as a vector of numbers between 0 and 1, and what it makes."""
+"""The freedom of a placement: its variables between 0 and 1, and the scenario that they give."""
 
 from __future__ import annotations
 
@@ -19,29 +19,29 @@ from fulcrum.synthesis.arrays import Array
 
 _FIXED: Range = (0.0, 0.0)
 _RANGES = ("x", "y", "height", "yaw_deg", "turn_deg", "posture_deg")
-# Start angles keep this share of their joint's range clear of its ends [-].
+# Share of a joint's range that start angles keep free at both ends [-].
 _RANGE_LEFT = 0.05
-# Digits of metres and of degrees: what is written down is what was tried.
+# Digits of metres and degrees; rounded before the test, so that the written values were tested.
 _DIGITS_M, _DIGITS_DEG = 4, 2
 
 
 @dataclass(frozen=True)
 class Freedom:
-    """How far from where it is everything may move; a range from 0 to 0 leaves it there.
+    """The ranges in which a placement may differ from the present one; from 0 to 0 nothing moves.
 
-    A scene with two hands that mirror each other stays its own mirror image: the robots then move
-    in the mirror plane alone, and neither sideways nor in yaw.
+    A scene with two hands that mirror each other stays symmetric: the robots then move only within
+    the mirror plane, and do not turn in yaw.
 
     Attributes:
-        x, y: Of the robots' bases, all together, along the world's axes [m].
-        height: Of the bases [m].
-        yaw_deg: Of the bases about the vertical through the path's point [deg].
-        faces: Faces of the object that hands may touch beside the one where they are, by hand;
-            hands left out stay where they are. None for all hands, each on its present face.
+        x, y: Displacement of the robots' bases, all together, along the world's axes [m].
+        height: Change of the bases' height [m].
+        yaw_deg: Rotation of the bases about the vertical through the path's point [deg].
+        faces: Faces of the object that hands may touch besides their present one, by hand; hands
+            left out do not move. None: all hands may move, each on its present face.
         border: Distance that contacts keep from the ends of their faces [m].
-        turn_deg: Of the hands about their contact normals [deg].
-        posture_deg: Of the start angles of revolute joints, from which inverse kinematics seeks
-            [deg].
+        turn_deg: Rotation of the hands about their contact normals [deg].
+        posture_deg: Change of the start angles of revolute joints, at which inverse kinematics
+            starts [deg].
     """
 
     x: Range = (-0.4, 0.4)
@@ -65,7 +65,7 @@ class Freedom:
 
 @dataclass(frozen=True)
 class _Variable:
-    """One number that is sought: its name, range, and value as the scenario stands."""
+    """One variable of the search: its name, its range, and its value in the given scenario."""
 
     name: str
     low: float
@@ -77,17 +77,21 @@ class Moves:
     """The variables of a scenario with a freedom.
 
     Attributes:
-        names: Of the variables, (d,).
-        start: Where the scenario stands, each in [0, 1], (d,).
-        mirror: The mirror plane that is kept; None if there is none.
+        names: Names of the variables, (d,).
+        start: Values of the given scenario in [0, 1], (d,).
+        mirror: Mirror symmetry that is kept; None if there is none.
     """
 
     def __init__(self, scenario: Scenario, freedom: Freedom) -> None:
-        """Finds the variables.
+        """Find the variables.
+
+        Args:
+            scenario: Scenario with the present placement.
+            freedom: Ranges in which it may move.
 
         Raises:
-            InvalidInputError: Nothing may move, a hand named is not there, or a contact that may
-                move is on no face, or off it.
+            InvalidInputError: Nothing may move, a named hand does not exist, or a contact that may
+                move is not on a face.
         """
         self._scenario = scenario
         self.mirror = find_mirror(scenario)
@@ -125,7 +129,7 @@ class Moves:
         self.start = (np.array([v.now for v in variables]) - self._low) / (self._high - self._low)
 
     def scenario(self, x: Array) -> Scenario:
-        """The scenario at x in [0, 1], (d,)."""
+        """Return the scenario at x in [0, 1], (d,)."""
         values = self._low + np.clip(x, 0.0, 1.0) * (self._high - self._low)
         named = dict(zip(self.names, values.tolist(), strict=True))
         hands = {hand.name: hand for hand in self._scenario.hands}
@@ -171,7 +175,7 @@ class Moves:
         return variables
 
     def _held(self, hand: Hand, values: dict[str, float]) -> Hand:
-        """A hand on one of its faces, turned about its normal."""
+        """Return a hand on one of its faces, rotated about its contact normal."""
         name, faces = hand.name, self._faces.get(hand.name)
         if faces is not None:
             face = values.get(f"{name} face", 0.0)
@@ -184,11 +188,11 @@ class Moves:
         return replace(hand, tangent_O=triple(axes @ [math.cos(angle), math.sin(angle), 0.0]))
 
     def _image(self, second: Hand, first: Hand) -> Hand:
-        """The second hand as the image of the first, with the tangent that it has by its own."""
+        """Return the second hand as the image of the first, with the sign of its own tangent."""
         assert self.mirror is not None
         mirrored = self.mirror.direction
         own = self.mirror.hands[0]
-        # Which of the image's two tangents its own hand began with.
+        # The image's tangent may have either sign: use that of the given second hand.
         sign = math.copysign(1.0, np.dot(mirrored(own.tangent_O), second.tangent_O))
         tangent = triple(sign * np.array(mirrored(first.tangent_O)))
         if first.p_OC_O == own.p_OC_O:
@@ -199,12 +203,12 @@ class Moves:
 
 
 def rounded(angle: float) -> float:
-    """An angle [rad] that is a number of degrees with few digits."""
+    """Return an angle [rad], rounded to few digits in degrees."""
     return math.radians(round(math.degrees(angle), _DIGITS_DEG))
 
 
 def with_posture(scenario: Scenario, posture: dict[str, float]) -> Scenario:
-    """The scenario with other start angles [rad or m] of some joints, by their scene names."""
+    """Return the scenario with new start positions [rad or m] of joints, by their scene names."""
     robots = []
     for robot in scenario.robots:
         own = {joint: posture.get(robot.prefix + joint, q) for joint, q in robot.posture.items()}
@@ -213,7 +217,7 @@ def with_posture(scenario: Scenario, posture: dict[str, float]) -> Scenario:
 
 
 def _joint_ranges(scenario: Scenario, around_deg: Range) -> dict[str, Range]:
-    """Ranges of the start angles that may be chosen [deg], by joint that carries a hand."""
+    """Return the allowed ranges of start angles [deg], by joint that carries a hand."""
     scene = compose(scenario).compile()
     ranges = {}
     for name in dict.fromkeys(j for chain in chains(scene, scenario).values() for j in chain):
@@ -228,7 +232,7 @@ def _joint_ranges(scenario: Scenario, around_deg: Range) -> dict[str, Range]:
 
 
 def _based(robot: Robot, scenario: Scenario, values: dict[str, float]) -> Robot:
-    """A robot with its base elsewhere."""
+    """Return a robot with its base moved."""
     moves = [round(values.get(f"base {axis}", 0.0), _DIGITS_M) for axis in ("x", "y", "height")]
     degrees = round(values.get("base yaw", 0.0), _DIGITS_DEG)
     base, point = robot.base, np.asarray(scenario.path.point_W, float)

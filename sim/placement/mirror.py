@@ -1,4 +1,4 @@
-"""Whether a scene is its own mirror image: two hands face to face, on chains that mirror."""
+"""Mirror symmetry of a scene: two hands face to face, on chains that mirror each other."""
 
 from __future__ import annotations
 
@@ -13,9 +13,9 @@ from fulcrum.sim.model.object_path import object_path
 from fulcrum.sim.scenario import Hand, Scenario
 from fulcrum.synthesis.arrays import Array, Vector
 
-# Descriptions give frames in rounded numbers [m, and sines].
+# Tolerance of places and directions, as robot descriptions contain rounded numbers [m or -].
 _ALIKE = 1e-3
-# Tilts at which the path is looked at.
+# Number of tilts at which the path is checked.
 _LOOKS = 7
 
 
@@ -24,10 +24,10 @@ class Mirror:
     """The vertical plane that maps one hand, and its chain of joints, to the other.
 
     Attributes:
-        hands: The two; the second is the image of the first.
-        normal_W, point_W: The plane's normal in the world, and a point on it [m], (3,).
-        normal_O, point_O: The same in the object's frame.
-        joints: By joint of the first chain, its image in the second and the sign of its angle.
+        hands: The two hands; the second is the image of the first.
+        normal_W, point_W: Unit normal of the plane, and a point on it [m], in the world, (3,) each.
+        normal_O, point_O: Both in the object's frame, (3,) each.
+        joints: Image in the second chain and sign of its angle, by joint of the first chain.
     """
 
     hands: tuple[Hand, Hand]
@@ -38,18 +38,18 @@ class Mirror:
     joints: dict[str, tuple[str, float]]
 
     def point(self, p_O: Vector) -> Vector:
-        """Image of a point in the object's frame [m]."""
+        """Return the image of a point in the object's frame [m], (3,)."""
         p = np.asarray(p_O, float)
         return triple(p - _twice(p - self.point_O, self.normal_O))
 
     def direction(self, v_O: Vector) -> Vector:
-        """Image of a direction in the object's frame."""
+        """Return the image of a direction in the object's frame, (3,)."""
         v = np.asarray(v_O, float)
         return triple(v - _twice(v, self.normal_O))
 
 
 def chains(scene: mujoco.MjModel, scenario: Scenario) -> dict[str, tuple[str, ...]]:
-    """Names of the driven joints that carry each hand, from the root, by hand."""
+    """Return the names of the driven joints that carry a hand, from the root, by hand."""
     found = {}
     for hand in scenario.hands:
         names: list[str] = []
@@ -63,10 +63,10 @@ def chains(scene: mujoco.MjModel, scenario: Scenario) -> dict[str, tuple[str, ..
 
 
 def find_mirror(scenario: Scenario) -> Mirror | None:
-    """The mirror plane of a scene's hands; None if there is none across the world's x or y.
+    """Return the mirror symmetry of a scene's hands; None if there is none normal to world x or y.
 
-    What stands around, and joint limits, are not looked at: they may make the image of a good
-    placement a bad one, which the search then finds out.
+    Surroundings and joint limits are not checked. If they are not symmetric, the image of a good
+    placement may be a bad one; the search then rejects it.
     """
     if len(scenario.hands) != 2:
         return None
@@ -94,7 +94,7 @@ def find_mirror(scenario: Scenario) -> Mirror | None:
 
 
 def _stays(path: ObjectPath, normal: Array) -> bool:
-    """Whether the object neither leaves a plane with that normal nor turns out of it."""
+    """Return whether the object moves and rotates only within a plane with that normal."""
     start = path.pose(0.0)[1] @ normal
     for tilt in np.linspace(0.0, path.end, _LOOKS):
         aside = path.pose(float(tilt))[1] @ normal - start
@@ -106,7 +106,7 @@ def _stays(path: ObjectPath, normal: Array) -> bool:
 def _images(
     scenario: Scenario, normal: Array, center: Array
 ) -> dict[str, tuple[str, float]] | None:
-    """Joints of the second hand's chain that mirror those of the first, each with a sign."""
+    """Return the images of the first chain's joints in the second chain, and their signs."""
     scene = compose(scenario).compile()
     data = mujoco.MjData(scene)
     data.qpos[:] = scene.qpos0
@@ -123,12 +123,12 @@ def _images(
         apart = np.cross(anchor - data.xanchor[b], axis)
         if np.abs(axis - sign * data.xaxis[b]).max() > _ALIKE or np.abs(apart).max() > _ALIKE:
             return None
-        # A turn about an axis is mirrored into the opposite turn about the axis' image.
+        # The image of a rotation about an axis is the opposite rotation about the axis' image.
         turns = scene.jnt_type[a] == mujoco.mjtJoint.mjJNT_HINGE
         found[name] = (other, -sign if turns else sign)
     return found
 
 
 def _twice(v: Array, normal: Array) -> Array:
-    """What a reflection takes from a vector: twice its part along the unit normal, (3,)."""
+    """Return twice the part of a vector along the unit normal, which a reflection removes, (3,)."""
     return 2.0 * normal.dot(v) * normal

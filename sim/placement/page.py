@@ -1,4 +1,4 @@
-"""The page of a search for a placement."""
+"""The page with the result of a search for a placement."""
 
 from __future__ import annotations
 
@@ -9,12 +9,12 @@ from fulcrum.sim.placement.value import Value
 from fulcrum.sim.scenario import Scenario
 from fulcrum.synthesis.render import Lines, Mark, Marked, Page, page, table
 
-# Changes of angles below this are not listed [deg].
+# Smallest change of an angle that is listed [deg].
 _LISTED_DEG = 1.0
 
 
 def placement_page(scenario: Scenario, found: Placement) -> Page:
-    """Return what was gained, what was refused, what moved, and the run that tested it.
+    """Return gains, refused candidates, changes, and the run that tested them as a page.
 
     Args:
         scenario: Scene before the search.

@@ -1,4 +1,4 @@
-"""What a placement has gained, as a picture: over the tilt before and after, and the search."""
+"""The picture of a search for a placement: before and after over the tilt, and its progress."""
 
 from __future__ import annotations
 
@@ -20,18 +20,18 @@ from matplotlib.axes import Axes
 
 # Steps of the tilt [deg].
 _STEP_DEG = 5.0
-# Placements without forces cost this and more (see `value`); up there is not drawn.
+# Placements without forces cost at least this (see `value`); they are not drawn.
 _INFEASIBLE = 1.0
 
 
 def draw(before: Scenario, found: Placement, control: Control, file: Path) -> None:
-    """Writes the picture as PNG.
+    """Write the picture as PNG.
 
     Args:
-        before: The scene that the search was given.
-        found: What it found.
-        control: The controller whose margins counted.
-        file: Where to.
+        before: Scene before the search.
+        found: Result of the search.
+        control: Settings of the controller, which gave the margins.
+        file: Picture to write.
     """
     canvas, axes = plt.subplots(2, 2, figsize=(10, 7), layout="constrained")
     panels = axes.ravel()

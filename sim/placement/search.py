@@ -1,10 +1,10 @@
-"""Where to stand and where to hold: placements sought by differential evolution of the synthesis.
+"""The search for the best placement of robots and hands, by differential evolution.
 
-Robot base, contact places, turns of the hands and start posture are numbers x in a unit cube
-(:mod:`sim.placement.freedom`); what a placement is worth at a few tilts is one number to be
+Robot bases, contact places, rotations of the hands and start posture are variables x in a unit cube
+(:mod:`sim.placement.freedom`). The synthesis at a few tilts gives the cost of a placement, which is
 minimised (:mod:`sim.placement.value`). Differential evolution begins with a Sobol sample of the
-cube. The best few are then looked at over the full joint path and run in closed loop; the first
-that stands both and costs less than the placement given wins.
+cube. The best candidates are then evaluated over the full joint path and run in closed loop. The
+result is the first one that passes both and costs less than the given placement.
 
 Source: Storn and Price, Differential Evolution, Journal of Global Optimization 11, 1997.
 """
@@ -36,34 +36,34 @@ from fulcrum.synthesis import FulcrumError
 from fulcrum.synthesis.arrays import Array
 from fulcrum.synthesis.checks import positive, whole
 
-# Placements of a generation, at most and at least: even shares for 1, 2 and 4 processes.
+# Largest and smallest number of placements in a generation; 1, 2 or 4 processes share it evenly.
 _POPULATION, _LEAST = 32, 8
-# The search ends when the costs of a generation lie as near together as this.
+# Spread of the costs in a generation at which the search ends [-].
 _ALIKE = 1e-5
-# Candidates looked at in full, and how far apart they are, at least, in some number [-].
+# Number of candidates evaluated in full, and their least distance in some variable [-].
 _FINALISTS, _APART = 4, 0.01
-# What has to be gained, as a share of the cost: less is noise.
+# Least gain, as a share of the cost [-]; less is noise.
 _GAIN = 1e-3
-# Share of the time that is kept for the candidates.
+# Share of the time that is reserved for the full evaluation of candidates [-].
 _KEPT = 0.35
 
 # Called with evaluations done and in total, and a note.
 SearchProgress = Callable[[int, int, str], None]
-# Calls a function with a task and each of some others, on all processes.
+# Calls a function with a pickled task and each item of a sequence, on all processes.
 _Call = Callable[[Callable, bytes, Sequence], list]
 
 
 @dataclass(frozen=True)
 class Effort:
-    """How long is sought.
+    """The effort of a search.
 
     The same seed gives the same placement, unless the time ends before the evaluations.
 
     Attributes:
-        evaluations: Placements that are looked at, at most; at least 8.
-        seconds: Time for everything [s].
-        seed: Draws the samples.
-        workers: Processes; 1 is the present one.
+        evaluations: Largest number of placements that are evaluated; at least 8.
+        seconds: Time limit of the whole search [s].
+        seed: Seed of the samples.
+        workers: Number of processes; 1 uses the present one.
     """
 
     evaluations: int = 600
@@ -80,17 +80,17 @@ class Effort:
 
 @dataclass(frozen=True, eq=False)
 class Placement:
-    """What a search found.
+    """The result of a search.
 
     Attributes:
-        scenario: The scene as it is best placed; the one given if nothing better was found.
-        goal: What was sought.
-        before, after: What the given and the best placement are worth over the full joint path.
-        report: Of the best one's closed-loop run; None if nothing better was found.
-        refused: Why better candidates were not taken, the best first.
-        history: Evaluations done, and the least cost so far, after every sample.
-        in_time: Whether the search came to its end before its time did.
-        seconds: How long it took [s].
+        scenario: Scene with the best placement; the given one if nothing better was found.
+        goal: Goal of the search.
+        before, after: Values of the given and the best placement over the full joint path.
+        report: Report of the best one's closed-loop run; None if nothing better was found.
+        refused: Reasons why better candidates were refused, the best candidate first.
+        history: Evaluations done and least cost so far, after every sample.
+        in_time: Whether the search ended before its time limit.
+        seconds: Duration of the search [s].
     """
 
     scenario: Scenario
@@ -111,7 +111,7 @@ class Placement:
 
 @dataclass(frozen=True)
 class _Task:
-    """What every evaluation needs."""
+    """The data that every evaluation needs."""
 
     scenario: Scenario
     controller: str
@@ -128,18 +128,18 @@ def search(
     effort: Effort | None = None,
     progress: SearchProgress | None = None,
 ) -> Placement:
-    """Seeks the best placement.
+    """Search for the best placement.
 
     Args:
-        scenario: The scene as it is placed now, well or badly.
-        controller: Whose margins count, and who runs what was found.
-        goal: What is sought.
-        freedom: What may move.
-        effort: How long is sought.
+        scenario: Scene with the present placement, which may be infeasible.
+        controller: Name of the controller, which gives the margins and runs the candidates.
+        goal: Goal of the search.
+        freedom: Ranges in which the placement may move.
+        effort: Limits of evaluations and time.
         progress: Called after every sample.
 
     Raises:
-        InvalidInputError: Nothing may move, or not as the freedom says, or there is no such
+        InvalidInputError: Nothing may move, the freedom does not fit the scene, or there is no such
             controller.
     """
     started = time.monotonic()
@@ -184,7 +184,7 @@ def search(
 
 
 class _Sampler:
-    """Asks for placements in batches, and keeps what they cost."""
+    """The sampler: it asks for the costs of placements in batches, and stores them."""
 
     def __init__(self, start: Array, effort: Effort, deadline: float) -> None:
         self._start, self._effort, self._deadline = start, effort, deadline
@@ -194,13 +194,13 @@ class _Sampler:
 
     @property
     def done(self) -> int:
-        """Evaluations done."""
+        """Number of evaluations done."""
         return len(self._tried)
 
     def run(self, costs: Callable[[list[Array]], list[float]], report: SearchProgress) -> None:
-        """Searches until the evaluations or the time are used up, or nothing changes any more."""
+        """Search until the evaluations or the time are used up, or the costs have converged."""
         rng = np.random.default_rng(self._effort.seed)
-        # A Sobol sample is even if its size is a power of two.
+        # A Sobol sample is balanced only if its size is a power of two.
         size = min(_POPULATION, 2 ** int(math.log2(self._effort.evaluations)))
         first = qmc.Sobol(len(self._start), rng=rng).random(size)
         first[0] = self._start
@@ -224,7 +224,7 @@ class _Sampler:
         costs: Callable[[list[Array]], list[float]],
         report: SearchProgress,
     ) -> list[float]:
-        if not self.in_time:  # the first sample has used it up
+        if not self.in_time:  # the first sample has used up the time
             return [math.inf] * len(batch)
         found = costs(batch)
         self._tried += zip(found, batch, strict=True)
@@ -236,7 +236,7 @@ class _Sampler:
         return found
 
     def best(self) -> list[Array]:
-        """The placements that cost least, no two alike."""
+        """Return the placements of least cost that differ enough from each other."""
         found: list[Array] = []
         for _, x in sorted(self._tried, key=lambda tried: tried[0]):
             if all(np.abs(x - other).max() > _APART for other in found):
@@ -248,7 +248,7 @@ class _Sampler:
 
 @dataclass(frozen=True, eq=False)
 class _Shared:
-    """What all evaluations of a task have in common: found once per process."""
+    """The data that all evaluations of a task share; they are computed once per process."""
 
     task: _Task
     moves: Moves
@@ -262,25 +262,25 @@ def _shared(packed: bytes) -> _Shared:
 
 
 def _cost(packed: bytes, x: Array) -> float:
-    """Of a placement, looked at coarsely."""
+    """Return the cost of a placement by coarse steps."""
     shared = _shared(packed)
     task, candidate = shared.task, shared.moves.scenario(x)
     return assess(candidate, task.control, task.goal, COARSE, shared.tolerated, whole=False).cost
 
 
 def _look(packed: bytes, x: Array | None) -> tuple[Scenario, Value]:
-    """A placement, and what it is worth over the full joint path; None is the one given."""
+    """Return a placement and its value over the full joint path; None for the given placement."""
     shared = _shared(packed)
     task, candidate = shared.task, shared.task.scenario
     if x is not None:
         candidate = shared.moves.scenario(x)
-        with contextlib.suppress(PathError):  # which the value says, too
+        with contextlib.suppress(PathError):  # the value reports it, too
             candidate = settled(candidate)
     return candidate, assess(candidate, task.control, task.goal, FULL, shared.tolerated)
 
 
 def _run(packed: bytes, candidate: Scenario) -> Report | str:
-    """The report of a placement's closed-loop run if it passes, else why it does not."""
+    """Return the report of a placement's closed-loop run if it passes, else the reason."""
     task = _shared(packed).task
     try:
         report = execute(Request(candidate, task.controller, task.control)).report
@@ -291,7 +291,7 @@ def _run(packed: bytes, candidate: Scenario) -> Report | str:
 
 @contextlib.contextmanager
 def _processes(count: int) -> Iterator[_Call]:
-    """What calls a function with each of some second arguments, on so many processes."""
+    """Yield a function that calls another one for each item of a sequence, on several processes."""
     if count == 1:
         yield lambda function, packed, each: [function(packed, one) for one in each]
         return

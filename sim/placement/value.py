@@ -1,4 +1,4 @@
-"""How good a placement is, as one number, and how near to a good one a bad one is."""
+"""The value of a placement as one cost; for an infeasible one it tells how much is missing."""
 
 from __future__ import annotations
 
@@ -30,11 +30,11 @@ from fulcrum.synthesis.arrays import Array
 
 
 class Goal(StrEnum):
-    """What is sought over the whole path.
+    """The goal of a search, over the whole path.
 
-    HEAVIEST: that the heaviest object can be held. LARGEST_MARGIN: that the contact which uses
-    most of its friction uses as little of it as forces can make it. LOWEST_TORQUE: that the joint
-    which uses most of its torque uses as little as forces can make it.
+    HEAVIEST: the heaviest object that can be held is as heavy as possible. LARGEST_MARGIN: the
+    largest share of its friction that a contact uses is as small as possible. LOWEST_TORQUE: the
+    largest share of its torque limit that a joint uses is as small as possible.
     """
 
     HEAVIEST = "heaviest"
@@ -44,13 +44,13 @@ class Goal(StrEnum):
 
 @dataclass(frozen=True)
 class Steps:
-    """How closely a placement is looked at.
+    """The step sizes with which a placement is evaluated.
 
     Attributes:
         grid: Steps of the joint path.
-        solved: Pose error at which one of them counts as solved [m and rad].
-        tilt_deg: Step between the tilts at which forces are sought [deg].
-        room: Of its range that every joint keeps clear of its limits [-].
+        solved: Pose error at which a step counts as solved [m and rad].
+        tilt_deg: Step between the tilts at which forces are computed [deg].
+        room: Fraction of each joint's range kept free at both ends [-].
     """
 
     grid: JointGrid
@@ -59,36 +59,38 @@ class Steps:
     room: float
 
 
-# A cubic spline through the coarse steps is off by some 0.1 mm between them; the forces are sought
-# at the steps themselves. What is kept clear of between them is kept farther from.
+# A cubic spline through the coarse steps is off by about 0.1 mm between them; the forces are
+# computed at the steps themselves. The coarse grid has larger clearances, as it checks no places
+# between its steps.
 COARSE = Steps(
     JointGrid(15.0, 0.03, least=1, clearance_m=0.01), solved=1e-5, tilt_deg=15.0, room=0.02
 )
 FULL = Steps(JointGrid(), solved=1e-9, tilt_deg=5.0, room=0.0)
 
-# What a placement lacks, the worst first: each adds a share of 1 at most.
+# Base costs of infeasible placements by defect, the worst first; its size adds at most 1.
 _OVERLAPS, _OUT_OF_REACH, _STUCK, _CRAMPED, _WITHOUT_FORCES = 5.0, 4.0, 3.0, 2.0, 1.0
-# Feasible placements cost less than this.
+# Upper bound of the cost of feasible placements [-].
 _FEASIBLE = 0.999
-# The range of joints that have none [rad].
+# Range assumed for joints without limits [rad].
 _TURN = 2.0 * math.pi
 # Clearance of the robots' fixed parts [m].
 CLEARANCE = 0.005
-# Tilts at which the object's distance to them is taken.
+# Number of tilts at which the object's distance to the fixed parts is checked.
 _LOOKS = 7
 
 
 @dataclass(frozen=True)
 class Value:
-    """What a placement is worth.
+    """The value of a placement.
 
     Attributes:
-        cost: What is minimised; below 1 where forces exist all along the path.
-        reason: Why none do; empty if they do.
-        heaviest: The heaviest object that can be held all along the path [N].
-        friction: Share of its friction that a contact uses, at the least [-]; infinite without
-            forces.
-        torque: Share of its limit that a joint uses, at the least [-]; infinite without forces.
+        cost: Cost that is minimised [-]; below 1 if forces exist all along the path.
+        reason: Why the placement is infeasible; empty if it is feasible.
+        heaviest: Weight of the heaviest object that can be held all along the path [N].
+        friction: Largest share of its friction that a contact uses, as small as forces can make it
+            [-]; infinite without forces.
+        torque: Largest share of its torque limit that a joint uses, as small as forces can make it
+            [-]; infinite without forces.
         clearance: Least distance of a joint to its limits [rad or m].
     """
 
@@ -101,7 +103,7 @@ class Value:
 
     @property
     def feasible(self) -> bool:
-        """Whether the arms can follow, and forces exist, all along the path."""
+        """Whether the arms can follow the path and forces exist all along it."""
         return not self.reason
 
 
@@ -113,15 +115,16 @@ def assess(
     tolerated: frozenset[Names] = frozenset(),
     whole: bool = True,
 ) -> Value:
-    """What a placement is worth.
+    """Return the value of a placement.
 
     Args:
-        scenario: The scene.
-        control: The controller, whose friction factor and preload count (see :func:`believed`).
-        goal: What the cost is.
-        steps: How closely it is looked at.
+        scenario: Scene.
+        control: Settings of the controller; friction factor and preload are used (see
+            :func:`believed`).
+        goal: Goal that gives the cost.
+        steps: Step sizes of the evaluation.
         tolerated: Pairs of geoms that may touch at the start (see :func:`touching`).
-        whole: Whether all numbers are asked for, or the goal's alone.
+        whole: Whether to compute all numbers, not only that of the goal.
     """
     depths = {pair: d for pair, d in _depths(scenario).items() if pair not in tolerated}
     if depths and max(depths.values()) > 0.0:
@@ -175,11 +178,11 @@ def assess(
 def over_tilt(
     scenario: Scenario, control: Control, step_deg: float
 ) -> tuple[Array, tuple[Array, Array, Array]]:
-    """What limits a placement, by tilt.
+    """Return what limits a placement, by tilt.
 
     Args:
-        scenario: The scene.
-        control: The controller, as for :func:`assess`.
+        scenario: Scene.
+        control: Settings of the controller, as for :func:`assess`.
         step_deg: Largest step between tilts [deg].
 
     Returns:
@@ -202,18 +205,18 @@ def over_tilt(
 
 
 def believed(control: Control, scenario: Scenario) -> Control:
-    """The fixed margins that stand for a control's: of a robust one its own, and its preload."""
+    """Return the control with fixed margins only; a robust one is replaced by its preload."""
     robustness = control.robustness
     if robustness is None:
         return control
-    # Hands that may not press so hard bear what they can (see fulcrum.sim.planning.robust_grip).
+    # Only if every hand may press harder than that (see fulcrum.sim.planning.robust_grip).
     able = all(hand.f_n_max > robustness.preload for hand in scenario.hands)
     preload = max(control.preload, robustness.preload) if able else control.preload
     return replace(control, preload=preload, robustness=None)
 
 
 def settled(scenario: Scenario) -> Scenario:
-    """The scenario with the start posture in which its hands hold the object at the start.
+    """Return the scenario with a start posture in which its hands are at their contacts.
 
     Raises:
         PathError: The arms cannot follow the path.
@@ -225,15 +228,15 @@ def settled(scenario: Scenario) -> Scenario:
 
 
 def touching(scenario: Scenario) -> frozenset[Names]:
-    """What touches as the scenario stands, and so may: see :func:`assess`."""
+    """Return the pairs that touch in the given scenario, and therefore may: see :func:`assess`."""
     return frozenset(pair for pair, depth in _depths(scenario).items() if depth > 0.0)
 
 
 def _depths(scenario: Scenario) -> dict[Names, float]:
-    """How far parts of the robots are where they should not be, at the start [m], by pair.
+    """Return the depths by which parts of the robots violate their clearances [m], by pair.
 
-    That is: fixed parts within the clearance of object or environment anywhere on the path, and
-    links that overlap in the start posture, for which inverse kinematics does not look out.
+    These are fixed parts too near to the object or environment anywhere on the path, and links that
+    overlap in the start posture, which inverse kinematics does not check.
     """
     model = compose(scenario, ObjectMotion.POSED).compile()
     data = mujoco.MjData(model)
@@ -264,7 +267,7 @@ def _depths(scenario: Scenario) -> dict[Names, float]:
 
 
 def _span(problems: PathProblems, tilt: float, synthesizer: Synthesizer) -> tuple[float, float]:
-    """The lightest and heaviest object that can be held at a tilt [N]."""
+    """Return the weights of the lightest and heaviest object that can be held at a tilt [N]."""
     try:
         return weight_range(problems.problem(tilt), problems.gravity(tilt), synthesizer)
     except (InfeasibleError, SolverError):
@@ -272,7 +275,7 @@ def _span(problems: PathProblems, tilt: float, synthesizer: Synthesizer) -> tupl
 
 
 def _lack(weight: float, low: float, high: float) -> float:
-    """How far from a range a weight is: 0 within, 1 if there is none [-]."""
+    """Return the distance of a weight from a range [-]: 0 within it, 1 if the range is empty."""
     return max(0.0, 1.0 - high / weight, 1.0 - weight / low if low else 0.0)
 
 

@@ -1,4 +1,4 @@
-"""How a recording opens: the scene beside the curves that a reviewer looks at."""
+"""The layout of a recording in the viewer: the scene beside the curves for review."""
 
 from __future__ import annotations
 
@@ -23,7 +23,12 @@ _CURVES = (
 
 
 def blueprint(scenario: Scenario, center: Array) -> rrb.Blueprint:
-    """The layout for a scenario whose action is at a point in the world [m]."""
+    """Return the layout of a scenario.
+
+    Args:
+        scenario: Scenario that is recorded.
+        center: Point in the world relative to which the 3D view is placed [m], (3,).
+    """
     view = scenario.view
     eye = rrb.EyeControls3D(position=center + view.eye, look_target=center + view.target)
     scene = rrb.Spatial3DView(

@@ -1,7 +1,8 @@
-"""Recordings whose writer died in the middle of a message, made readable again.
+"""Repair of recordings whose writer ended in the middle of a message.
 
-A recording is a header and a chain of messages, each led by its kind and its length; the last one
-marks the end and is followed by a footer. Rerun refuses a file that ends within a message.
+A recording is a header and a chain of messages. Each message begins with its kind and its length.
+The last message marks the end and is followed by a footer. Rerun refuses a file that ends within a
+message.
 """
 
 from __future__ import annotations
@@ -13,14 +14,14 @@ import tempfile
 from collections.abc import Iterator
 from pathlib import Path
 
-MAGIC = b"RRF2"  # how a recording begins
+MAGIC = b"RRF2"  # first bytes of a recording
 _HEADER = 12  # bytes: magic, version, options
 _LEAD = struct.Struct("<QQ")  # kind and length of a message
 _END = 0  # kind of the message that marks the end
 
 
 def whole_bytes(path: Path) -> int:
-    """Bytes of a recording up to the end of its last whole message; all of a finished one."""
+    """Return the size up to the end of the last whole message [bytes]; all of a finished file."""
     size = path.stat().st_size
     with path.open("rb") as file:
         end = _HEADER
@@ -37,9 +38,9 @@ def whole_bytes(path: Path) -> int:
 
 @contextlib.contextmanager
 def readable(path: Path) -> Iterator[Path]:
-    """The recording itself if it ends with a whole message, else a copy of its whole messages.
+    """Yield the recording if it ends with a whole message, else a copy of its whole messages.
 
-    The file is left alone: somebody may still be writing it.
+    The file itself is not changed, as another process may still be writing it.
     """
     whole = whole_bytes(path)
     if whole == path.stat().st_size:

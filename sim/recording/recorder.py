@@ -1,4 +1,4 @@
-"""Writes a run to a Rerun recording while it runs."""
+"""The recorder, which writes a run to a Rerun recording while it runs."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ _METERS_PER_NEWTON = 0.003
 _CONE_LENGTH = 0.06  # [m]
 _CONE_RAYS = 6
 _CONE = _Look((250, 190, 40), 0.0003)
-# The commanded arrow is the thin core of the measured one, and shows where they disagree.
+# The commanded arrow is thin and inside the measured one; it is seen where they differ.
 _LOOKS = {
     "measured": _Look((220, 30, 30), 0.006),
     "commanded": _Look((40, 110, 250), 0.002),
@@ -41,10 +41,10 @@ _LOOKS = {
 
 
 class Recorder:
-    """Streams blocks of a run into a file, and to a viewer if asked to.
+    """A recorder that streams blocks of a run into a file, and to a viewer if one is given.
 
-    Force arrows are the forces on the object: they start at their contact, as does the friction
-    cone, in which they must lie. They point into the object, which is shown translucent.
+    Force arrows show the forces on the object. They start at their contact and must lie in the
+    friction cone, which starts there, too. They point into the object, which is translucent.
     """
 
     def __init__(
@@ -58,24 +58,24 @@ class Recorder:
         plan: Plan | None = None,
         viewer_url: str | None = None,
     ) -> None:
-        """Opens the file and writes everything that does not change.
+        """Open the file and write everything that does not change.
 
         Args:
             path: File to write.
-            scenario: What runs.
+            scenario: Scenario of the run.
             config: Resolved configuration, shown as text.
             joints: Names of the l driven joints.
-            tau_min: Torque limits [N·m or N], (l,).
-            tau_max: Torque limits [N·m or N], (l,).
-            plan: Of the tilt, shown beside what is measured; None if it is not planned.
-            viewer_url: A viewer that follows the run.
+            tau_min: Lower torque limits [N·m or N], (l,).
+            tau_max: Upper torque limits [N·m or N], (l,).
+            plan: Plan of the tilt, shown beside the measurements; None if it is not planned.
+            viewer_url: URL of a viewer that follows the run; None if there is none.
         """
         self._scenario = scenario
         self._cones = np.array([_cone(contact.mu) for contact in true_contacts(scenario)])
         self._tau_min, self._tau_max = tau_min, tau_max
         self._plan, self._path = plan, object_path(scenario.path)
         self._stride = max(1, round(_POSE_PERIOD / scenario.physics.timestep))
-        # Viewers keep the first blueprint they see per application id.
+        # A viewer keeps the first blueprint of an application id; so each scenario has its own id.
         self._recording = rr.RecordingStream(f"fulcrum {scenario.name}")
         sinks: list[Any] = [rr.FileSink(path)]
         self._streamed = viewer_url is not None
@@ -87,7 +87,7 @@ class Recorder:
         self._scenery = Scenery(scenario, joints)
         self._scenery.log_shapes(self._recording)
         self._log_static(config, joints)
-        self._flush()  # what is logged waits for company; blocks of columns do not
+        self._flush()  # logged items are buffered, columns are not
 
     def _log_static(self, config: dict[str, Any], joints: tuple[str, ...]) -> None:
         text = f"```json\n{json.dumps(config, indent=2)}\n```"
@@ -133,7 +133,7 @@ class Recorder:
         self._recording.log(path, document, static=True)
 
     def write(self, block: Trace, history: ContactHistory) -> None:
-        """Appends the next rows of the run."""
+        """Append the next rows of the run."""
         time = rr.TimeColumn(TIMELINE, duration=block.t)
         tilt = np.degrees(np.column_stack([block.tilt_ref, block.tilt]))
         self._send("tilt", time, tilt)
@@ -160,11 +160,11 @@ class Recorder:
         self._recording.send_columns(f"plots/{path}", [time], scalars(values))
 
     def _shares(self, tau: Array) -> Array:
-        """Torques over their limits, with their sign."""
+        """Return torques as signed shares of their limits [-]."""
         return torque_shares(tau, self._tau_min, self._tau_max) * np.sign(tau)
 
     def _send_plan(self, block: Trace) -> None:
-        """What was planned for the tilts of the rows, while the path moves."""
+        """Send the planned values at the tilts of the rows in which the path moves."""
         moving = block.rate_ref != 0.0
         if self._plan is None or not moving.any():
             return
@@ -174,7 +174,7 @@ class Recorder:
         self._send("torque/planned", time, self._shares(along.tau))
 
     def _send_phases(self, block: Trace) -> None:
-        """Marks the rows at which a phase begins, or what the run does in it changes."""
+        """Mark the rows at which phase or mode change."""
         states = np.column_stack([block.phase, block.mode])
         before = np.vstack([self._state, states[:-1]])
         begun = np.flatnonzero((states != before).any(axis=1))
@@ -205,7 +205,7 @@ class Recorder:
         self._recording.send_columns("cones", [time], strips(cones))
 
     def close(self, verdict: str) -> None:
-        """Writes the verdict, as Markdown, and completes the file."""
+        """Write the verdict, given as Markdown, and complete the file."""
         self._log_text("verdict", verdict)
         self._flush()
         self._recording.disconnect()
@@ -213,13 +213,13 @@ class Recorder:
     def _flush(self) -> None:
         try:
             self._recording.flush()
-        except RuntimeError:  # somebody may close the viewer, but the file must be whole
+        except RuntimeError:  # the viewer may have been closed; the file must be completed
             if not self._streamed:
                 raise
 
 
 def colors(count: int) -> list[tuple[int, ...]]:
-    """Distinct colours, evenly spaced in hue."""
+    """Return distinct colours, evenly spaced in hue."""
     hues = (np.arange(count) / max(count, 1) + 0.02) % 1.0
     return [tuple(round(255 * x) for x in colorsys.hsv_to_rgb(hue, 0.75, 0.95)) for hue in hues]
 
@@ -229,12 +229,12 @@ def _pale(color: tuple[int, ...]) -> tuple[int, ...]:
 
 
 def _cone(mu: float) -> Array:
-    """Wire cone of friction mu in contact axes as one strip, (p, 3): apex, rim, and each ray."""
+    """Return the wire cone of friction mu in contact axes as one strip [m], (p, 3)."""
     angles = np.linspace(0.0, 2.0 * np.pi, _CONE_RAYS, endpoint=False)
     rim = _CONE_LENGTH * np.column_stack(
         [mu * np.cos(angles), mu * np.sin(angles), np.ones(_CONE_RAYS)]
     )
     apex = np.zeros((1, 3))
-    # Up one ray, along the rim, down the next.
+    # The strip goes up one ray, along the rim, and down the next ray.
     rays = [np.vstack([rim[k : k + 2], apex]) for k in range(0, _CONE_RAYS, 2)]
     return np.vstack([apex, rim, *rays])

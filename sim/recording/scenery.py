@@ -1,4 +1,4 @@
-"""What stands in a recording's 3D view: the scene's shapes, and where they are over time."""
+"""The bodies in a recording's 3D view: their shapes, and their poses over time."""
 
 from __future__ import annotations
 
@@ -21,13 +21,13 @@ from fulcrum.sim.signals import Trace
 from fulcrum.synthesis.arrays import Array
 
 WORLD = "world"
-_POSES = f"{WORLD}/poses"  # one entity holds those of all bodies, whose frames its rows name
-# Edge length of what stands for an infinite plane, and its thickness [m].
+_POSES = f"{WORLD}/poses"  # one entity for the poses of all bodies; its rows name the frames
+# Edge length and thickness of the plate that shows an infinite plane [m].
 _PLANE_SIZE, _PLANE_THICKNESS = 2.0, 0.002
 
 
 class Scenery:
-    """Static shapes and moving bodies of a scenario, posed by the scene's own kinematics."""
+    """The static shapes and moving bodies of a scenario, posed by the kinematics of the scene."""
 
     def __init__(self, scenario: Scenario, joints: tuple[str, ...]) -> None:
         self._scenario = scenario
@@ -36,7 +36,7 @@ class Scenery:
         self._q = np.array([int(self._model.joint(name).qposadr[0]) for name in joints])
         self._object = int(self._model.body(scenario.object.name).mocapid[0])
         self._visuals: list[Visual] = []
-        self._dressed: set[str] = set()  # bodies of robots that have meshes
+        self._dressed: set[str] = set()  # bodies of robots with meshes
         for robot in scenario.robots:
             self._dress(robot)
         shown = {self._model.body(visual.link).id for visual in self._visuals}
@@ -47,7 +47,7 @@ class Scenery:
         self._frames = [f"tf#/{self._path(body)}" for body in self._moving]
 
     def _dress(self, robot: Robot) -> None:
-        """Takes over the meshes of a robot that has some."""
+        """Store the meshes of a robot, if it has any."""
         description = looks_of(robot.model)
         if description is None:
             return
@@ -60,7 +60,7 @@ class Scenery:
             self._dressed |= {robot.prefix + link for link in links}
 
     def _primitives(self) -> Iterator[int]:
-        """Visible geoms; a robot's own collision primitives only where it has no meshes."""
+        """Yield visible geoms; collision primitives of a robot only if it has no meshes."""
         scenario = self._scenario
         own = {g.name for g in (*scenario.object.geoms, *scenario.environment)}
         hands = {self._model.body(hand_body(hand)).id for hand in scenario.hands}
@@ -74,7 +74,7 @@ class Scenery:
                 yield g
 
     def log_shapes(self, recording: rr.RecordingStream) -> None:
-        """Logs everything that does not change."""
+        """Log everything that does not change."""
         recording.log(WORLD, rr.ViewCoordinates.RIGHT_HAND_Z_UP, static=True)
         for i, visual in enumerate(self._visuals):
             path = f"{self._path(self._model.body(visual.link).id)}/mesh_{i}"
@@ -105,7 +105,7 @@ class Scenery:
             )
 
     def send_poses(self, recording: rr.RecordingStream, rows: Trace) -> None:
-        """Sends the poses of all moving bodies at the given rows."""
+        """Send the poses of all moving bodies at the given rows."""
         positions = np.empty((len(rows), len(self._moving), 3))
         quaternions = np.empty((len(rows), len(self._moving), 4))
         for k in range(len(rows)):
@@ -158,7 +158,7 @@ def _shape(model: mujoco.MjModel, g: int) -> rr.AsComponents:
 
 
 def _mesh(model: mujoco.MjModel, g: int) -> rr.AsComponents:
-    """A mesh geom in its body's frame, with flat faces."""
+    """Return a mesh geom in its body's frame, with flat faces."""
     geom, mesh = model.geom(g), model.mesh(int(model.geom_dataid[g]))
     vertices = slice(int(mesh.vertadr[0]), int(mesh.vertadr[0] + mesh.vertnum[0]))
     faces = slice(int(mesh.faceadr[0]), int(mesh.faceadr[0] + mesh.facenum[0]))

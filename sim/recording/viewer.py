@@ -1,4 +1,4 @@
-"""Opens recordings: in the viewer, or without a screen as a picture at a moment."""
+"""Display of recordings: in the viewer, or as a picture of one moment without a screen."""
 
 from __future__ import annotations
 
@@ -28,8 +28,8 @@ _RERUN = (sys.executable, "-m", "rerun")
 _SIZE = "1920x1080"
 _LOADING_S = 60.0
 _POLL_S = 0.2
-# The viewer fetches what it shows only once it is asked to paint it: a picture counts when it has
-# not changed for this many seconds, and at the deadline at the latest.
+# The viewer loads data only when it draws them. So a picture is taken when it has not changed for
+# _SETTLED_S, and at the deadline at the latest [s].
 _SETTLED_S, _DEADLINE_S, _PAINT_S = 1.5, 20.0, 0.5
 
 
@@ -38,10 +38,10 @@ class ViewerError(FulcrumError):
 
 
 def recording_file(run: Path) -> Path:
-    """The recording of a run, given its folder or the file itself.
+    """Return the recording of a run, given its folder or the file itself.
 
     Raises:
-        InvalidInputError: There is none.
+        InvalidInputError: There is no recording.
     """
     path = run / "run.rrd" if run.is_dir() else run
     if path.suffix != ".rrd" or not path.is_file() or not _is_recording(path):
@@ -57,7 +57,7 @@ def _is_recording(path: Path) -> bool:
 
 
 def view(run: Path) -> None:
-    """Opens a recording in the Rerun viewer; returns when the viewer is closed."""
+    """Open a recording in the Rerun viewer; return when the viewer is closed."""
     with readable(recording_file(run)) as path:
         command = [*_RERUN, str(path)]
         if subprocess.run(command, check=False, stderr=subprocess.DEVNULL).returncode != 0:
@@ -65,7 +65,7 @@ def view(run: Path) -> None:
 
 
 def open_viewer() -> str:
-    """Opens an empty viewer that outlives this process; returns the URL to stream to.
+    """Open an empty viewer that outlives this process, and return the URL to stream to.
 
     Raises:
         ViewerError: This machine cannot show a window.
@@ -77,7 +77,12 @@ def open_viewer() -> str:
 
 
 def screenshot(run: Path, at_s: float, picture: Path) -> None:
-    """Writes a picture (PNG) of a recording as it opens, at a moment, without a screen.
+    """Write a picture of a recording in its initial layout; no screen is needed.
+
+    Args:
+        run: Folder of the run, or its recording.
+        at_s: Moment that the picture shows [s].
+        picture: PNG file to write.
 
     Raises:
         InvalidInputError: There is no such recording, or the moment lies outside it.
@@ -94,7 +99,7 @@ def screenshot(run: Path, at_s: float, picture: Path) -> None:
 
 @contextlib.contextmanager
 def headless_viewer() -> Iterator[ViewerClient]:
-    """A viewer without a window, closed at the end.
+    """Yield a viewer without a window, which is closed at the end.
 
     Raises:
         ViewerError: This machine cannot draw.
@@ -108,14 +113,14 @@ def headless_viewer() -> Iterator[ViewerClient]:
     except (RuntimeError, ConnectionError) as died:
         raise ViewerError(_NO_DRAWING) from died
     finally:
-        # The viewer is a child of the process that was started: both must go.
+        # The viewer is a child of the process that was started: both must be ended.
         with contextlib.suppress(ProcessLookupError):
             os.killpg(process.pid, signal.SIGKILL)
         process.wait()
 
 
 def _start(*options: str) -> tuple[subprocess.Popen[bytes], str]:
-    """Starts a viewer process in its own group; its URL. Its log is dropped."""
+    """Start a viewer process in its own group without a log; return it and its URL."""
     with socket.socket() as probe:
         probe.bind(("127.0.0.1", 0))
         port = probe.getsockname()[1]
@@ -129,10 +134,10 @@ def _start(*options: str) -> tuple[subprocess.Popen[bytes], str]:
 
 
 def _connect(process: subprocess.Popen[bytes], url: str) -> ViewerClient | None:
-    """A client once the viewer answers; None if it never does."""
+    """Return a client as soon as the viewer answers; None if it never does."""
     deadline = time.monotonic() + _LOADING_S
     while process.poll() is None and time.monotonic() < deadline:
-        # The client raises bare RuntimeErrors while the viewer is not up.
+        # The client raises RuntimeError until the viewer is ready.
         with contextlib.suppress(RuntimeError, ConnectionError):
             client = ViewerClient.connect(url)
             client.get_state()
@@ -142,7 +147,7 @@ def _connect(process: subprocess.Popen[bytes], url: str) -> ViewerClient | None:
 
 
 def _settled_picture(client: ViewerClient) -> bytes:
-    """The viewer's picture once it has stopped changing."""
+    """Return the viewer's picture as soon as it has stopped changing."""
     deadline = time.monotonic() + _DEADLINE_S
     last, since = client.take_screenshot(), time.monotonic()
     while time.monotonic() < deadline and time.monotonic() - since < _SETTLED_S:
@@ -154,7 +159,7 @@ def _settled_picture(client: ViewerClient) -> bytes:
 
 
 def _time_range(client: ViewerClient) -> tuple[float, float]:
-    """First and last moment [s] of the recording, once it is loaded."""
+    """Wait until the recording is loaded, and return its first and last moment [s]."""
     deadline = time.monotonic() + _LOADING_S
     while time.monotonic() < deadline:
         state = client.get_state()

@@ -1,4 +1,4 @@
-"""One run from request to report: preparation, the loop, files, and a dm_env environment."""
+"""One run from request to report: preparation, closed loop, files, and a dm_env environment."""
 
 from fulcrum.sim.run.crosscheck import Bounds, Crosscheck
 from fulcrum.sim.run.execute import PACKAGES, Request, Result

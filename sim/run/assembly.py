@@ -1,4 +1,4 @@
-"""Puts plant, world and controller together into a closed loop."""
+"""The closed loop, made from plant, world and controller."""
 
 from __future__ import annotations
 
@@ -23,20 +23,20 @@ def closed_loop(
     """Return a loop that is ready to run.
 
     Args:
-        scenario: What the controller believes.
-        control: The controller's settings.
-        prepared: What :func:`prepare` gives for both; found here if left out, unchecked.
-        world: How the plant deviates from the truth, and what disturbs it; nothing by default.
-        truth: What the plant is but for the world; the scenario if left out.
-        seed: Draws the deviations of the start posture.
-        engine: What simulates the plant.
-        best_effort: Whether forces nearest to balance are applied where none balance the object.
+        scenario: Scenario that the controller assumes.
+        control: Settings of the controller.
+        prepared: Result of :func:`prepare` for both; computed here without checks if left out.
+        world: Deviations and disturbances of the plant; none by default.
+        truth: Scenario that the plant has before the world is applied; by default `scenario`.
+        seed: Seed of the deviations of the start posture.
+        engine: Engine that simulates the plant.
+        best_effort: Whether to apply the forces nearest to balance where none balance the object.
 
     Raises:
         InvalidInputError: The world does not fit the scenario.
         PathError: The arms cannot follow the path.
         RobustInfeasibleError: No grip holds even the nominal object somewhere on the path.
-        DivergedError: The start's state is more than numbers can hold.
+        DivergedError: The state at the start is not finite.
     """
     prepared = prepared or prepare(scenario, control, best_effort, check=False)
     path, grip = prepared.joint_path, prepared.grip

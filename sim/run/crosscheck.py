@@ -1,4 +1,4 @@
-"""The same runs in two engines and at half the step: where do their results differ?"""
+"""Cross-check of a run in two engines and at half the step: where do the results differ?"""
 
 from __future__ import annotations
 
@@ -20,10 +20,10 @@ from fulcrum.synthesis.arrays import N, T
 
 @dataclass(frozen=True)
 class Variant:
-    """How a run is simulated.
+    """A way to simulate a run.
 
     Attributes:
-        engine: What simulates the plant.
+        engine: Engine that simulates the plant.
         substeps: Physics steps per step of the scenario.
     """
 
@@ -32,7 +32,7 @@ class Variant:
 
     @property
     def name(self) -> str:
-        """As in tables and figures."""
+        """Name in tables and figures."""
         return self.engine.value + ("" if self.substeps == 1 else ", half step")
 
 
@@ -47,11 +47,11 @@ VARIANTS = (
 
 @dataclass(frozen=True)
 class Bounds:
-    """Up to what differences two variants agree; slip has no bound, as it is numerical creep.
+    """The largest differences between variants that agree; slip is left out: it is numerical creep.
 
     Attributes:
-        final_deg: Of the final tilt [deg].
-        error_deg: Of the largest tilt error [deg].
+        final_deg: Difference of the final tilt [deg].
+        error_deg: Difference of the largest tilt error [deg].
         hand: RMS of the difference of a hand's normal forces over their peak [-].
     """
 
@@ -62,7 +62,7 @@ class Bounds:
 
 @dataclass(frozen=True)
 class ContactDifference:
-    """How one contact differs, as long as the object is held with full grip.
+    """The difference of one contact while the object is held with full grip.
 
     Attributes:
         normal_rms_n: RMS of the difference of the normal forces [N].
@@ -84,13 +84,13 @@ class ContactDifference:
 
 @dataclass(frozen=True, eq=False)
 class Comparison:
-    """One variant of a run against the reference.
+    """The comparison of one variant of a run with the reference.
 
     Attributes:
-        variant: How it was simulated.
-        result: What it gave.
+        variant: Way in which the run was simulated.
+        result: Result of the run.
         contacts: Differences by contact, hands first.
-        disagreements: Where it differs by more than the bounds, in words.
+        disagreements: Differences beyond the bounds, in words.
     """
 
     variant: Variant
@@ -101,11 +101,11 @@ class Comparison:
 
 @dataclass(frozen=True, eq=False)
 class Crosscheck:
-    """All variants of one world, the reference first.
+    """The cross-check of one world: all its variants, the reference first.
 
     Attributes:
-        label: Which world it is.
-        comparisons: One for each variant.
+        label: Label of the world.
+        comparisons: One comparison for each variant.
     """
 
     label: str
@@ -127,10 +127,10 @@ def crosscheck(
     """Run all variants of each world.
 
     Args:
-        request: What to run; its folder, world and seed do not count.
+        request: Run to simulate; its folder, world and seed are ignored.
         worlds: Worlds and seeds by label.
-        variants: How to simulate; the first is the reference.
-        bounds: Up to what differences variants agree.
+        variants: Ways to simulate; the first is the reference.
+        bounds: Largest differences between variants that agree.
         progress: Called with runs done and runs in total.
 
     Raises:
@@ -156,7 +156,7 @@ def crosscheck(
 
 
 def run_variant(request: Request, variant: Variant, prepared: Preparation) -> Result:
-    """Run a request in a variant; the trace has the rows of the scenario's own step."""
+    """Run a request in a variant; the rows of the trace are at the scenario's own step."""
     physics = request.scenario.physics
     step = physics.timestep / variant.substeps
     scenario = replace(request.scenario, physics=replace(physics, timestep=step))
@@ -175,9 +175,9 @@ def run_variant(request: Request, variant: Variant, prepared: Preparation) -> Re
 def compare(
     variant: Variant, result: Result, reference: Result, scenario: Scenario, bounds: Bounds
 ) -> Comparison:
-    """Compare a run of a scenario with the reference, forces as long as there is full grip.
+    """Compare a run of a scenario with the reference; forces are compared during full grip only.
 
-    Before and after that the object stands on more than the contacts that have names.
+    Before and after that, the object also stands on contacts that are not in the scenario.
     """
     ours, theirs = result.history.w_measured_C, reference.history.w_measured_C
     rows = min(len(ours), len(theirs))
@@ -225,5 +225,5 @@ def _disagreements(
 
 
 def causes(report: Report) -> set[Category]:
-    """Return what kinds of failure a report has."""
+    """Return the categories of the failures in a report."""
     return {failure.category for failure in report.failures}

@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 from fulcrum.sim.run.crosscheck import Crosscheck
 from fulcrum.synthesis.arrays import N
 
-# Of a variant: the engine's colour, dashed for smaller steps.
+# Colours of the engines; lines of variants with smaller steps are dashed.
 _COLORS = {"mujoco": "C0", "drake": "C1"}
 
 
@@ -19,9 +19,9 @@ def draw_crosscheck(title: str, check: Crosscheck, path: Path) -> None:
     """Draw tilt error and normal forces over time, and their differences, as PNG.
 
     Args:
-        title: What was run.
-        check: Its variants.
-        path: The picture to write.
+        title: Title of the figure.
+        check: Variants to draw.
+        path: Picture to write.
     """
     reference = check.comparisons[0]
     names = list(reference.contacts)

@@ -19,12 +19,12 @@ from fulcrum.synthesis import InvalidInputError
 from fulcrum.synthesis.arrays import Array
 from fulcrum.synthesis.checks import positive
 
-# How near to a whole number a number of steps must be.
+# Allowed difference of a number of steps from a whole number [-].
 _WHOLE = 1e-6
 
 
 class TiltTask(control.Task):
-    """Tilt the object along the scenario's path.
+    """The task to tilt the object along the scenario's path.
 
     The action is the joint torques [N·m or N], (l,), bounded by their limits. Observations:
 
@@ -32,8 +32,8 @@ class TiltTask(control.Task):
     - ``object_pose``: position [m] and quaternion wxyz, (7,); ``object_twist``: (6,), linear first.
     - ``contact_forces``: force on the object in world axes [N] and torsional moment [N·m], (m, 4).
 
-    Contact forces and the object's twist are those during the last physics step, joints and pose
-    those after it. The reward is the share of the path's tilt that is reached, from 0 to 1.
+    Contact forces and the object's twist are from the last physics step; joints and pose are from
+    after it. The reward is the share of the path's tilt that is reached, from 0 to 1.
     """
 
     def __init__(self, scenario: Scenario, plant: MujocoPlant, seed: int) -> None:
@@ -44,22 +44,22 @@ class TiltTask(control.Task):
         self._deviation = self._robot.start_deviation
         self._random = np.random.default_rng(seed)
         self._object = scenario.object.name
-        # What happened in the last physics step.
+        # Twist and contact forces of the last physics step.
         hands, contacts = len(scenario.hands), len(scenario.contact_names)
         self._last = Trace.allocate(1, len(self._robot.joints), hands, contacts)
 
     def initialize_episode(self, physics: Any) -> None:
-        """Puts robot and object at their start, the joints with small random deviations."""
+        """Put robot and object at their start, the joints with small random deviations."""
         deviation = self._deviation * self._random.normal(size=len(self._start))
         self._plant.place(self._start + deviation)
         self._last.f_W[:] = self._last.twist_WO[:] = 0.0
 
     def before_step(self, action: Array, physics: Any) -> None:
-        """Applies the torques."""
+        """Apply the torques."""
         self._plant.apply(np.asarray(action))
 
     def after_step(self, physics: Any) -> None:
-        """Reads what happened in the last physics step, from the state before it."""
+        """Read twist and contact forces of the last physics step, from the state before it."""
         thing = physics.named.data
         self._last.p_WO[:] = thing.xpos[self._object]
         self._last.quat_WO[:] = thing.xquat[self._object]
@@ -67,14 +67,14 @@ class TiltTask(control.Task):
         self._plant.contacts(self._last)
 
     def action_spec(self, physics: Any) -> specs.BoundedArray:
-        """Joint torques within their limits."""
+        """Return the specification of the action: joint torques within their limits."""
         robot = self._robot
         shape = (len(robot.joints),)
         names = "\t".join(robot.joints)
         return specs.BoundedArray(shape, np.float64, robot.tau_min, robot.tau_max, names)
 
     def get_observation(self, physics: Any) -> OrderedDict[str, Array]:
-        """The observations by name."""
+        """Return the observations by name."""
         measurement = self._plant.measure()
         return OrderedDict(
             joint_positions=measurement.q,
@@ -85,7 +85,7 @@ class TiltTask(control.Task):
         )
 
     def get_reward(self, physics: Any) -> float:
-        """Share of the path's tilt that is reached."""
+        """Return the share of the path's tilt that is reached [-]."""
         tilt = float(self._path.tilt(self._plant.measure().quat_WO))
         return float(np.clip(tilt / self._path.end, 0.0, 1.0))
 
@@ -93,12 +93,12 @@ class TiltTask(control.Task):
 def make_environment(
     scenario: Scenario, seed: int = 0, control_timestep: float | None = None
 ) -> control.Environment:
-    """The scenario as an environment.
+    """Return a scenario as an environment.
 
     Args:
-        scenario: The scene.
-        seed: Draws the deviations of the start posture.
-        control_timestep: Time between actions [s]; that of the synthesis if left out.
+        scenario: Scene.
+        seed: Seed of the deviations of the start posture.
+        control_timestep: Time between actions [s]; by default that between syntheses.
 
     Raises:
         InvalidInputError: The time between actions is no multiple of the physics step.
@@ -117,5 +117,5 @@ def make_environment(
         TiltTask(scenario, plant, seed),
         time_limit=Schedule(scenario).total_s,
         control_timestep=control_timestep,
-        legacy_step=False,  # else new contacts would be read with old forces
+        legacy_step=False,  # otherwise new contacts would be read with old forces
     )

@@ -28,28 +28,28 @@ from fulcrum.sim.world import NO_DEVIATION, World
 from fulcrum.synthesis.render import Page, page, to_markdown
 
 RECORDING, CONFIG, REPORT = "run.rrd", "config.json", "report.json"
-# Whose versions may change a run's numbers.
+# Packages whose versions may change the numbers of a run.
 PACKAGES = ("mujoco", "dm-control", "mink", "pin", "clarabel", "rerun-sdk", "numpy", "scipy")
 
 
 @dataclasses.dataclass(frozen=True)
 class Request:
-    """What to run.
+    """A request for a run.
 
     Attributes:
-        scenario: The scene.
-        controller: Name of the controller; robust if left out, or dynamic with a planned tilt.
-        control: Settings to run with instead of those that the name stands for.
-        seed: Draws the small deviations of the start posture.
+        scenario: Scene.
+        controller: Name of the controller; by default robust, or dynamic if the tilt is planned.
+        control: Settings of the controller; by default those that belong to its name.
+        seed: Seed of the small deviations of the start posture.
         out: Folder for recording, configuration and report; None writes nothing.
-        live: Whether to open a viewer that follows the run (with ``out`` only).
-        best_effort: Whether to run although the synthesis finds no forces somewhere on the path:
-            with those nearest to balance there.
-        world: What is true of the plant beyond the scenario; nothing else by default.
+        live: Whether to open a viewer that follows the run (only with ``out``).
+        best_effort: Whether to run even if no forces exist somewhere on the path. The forces
+            nearest to balance are applied there.
+        world: Deviations and disturbances of the plant; none by default.
         planning: How the tilt is planned; None for the scenario's own timing.
-        disturbed: Whether the scenario's tolerances for disturbed runs count; if None, they do
-            where the world is not as believed.
-        engine: What simulates the plant.
+        disturbed: Whether to use the tolerances for disturbed runs; None to use them if the world
+            deviates from the scenario.
+        engine: Engine that simulates the plant.
     """
 
     scenario: Scenario
@@ -65,31 +65,31 @@ class Request:
     engine: Engine = Engine.MUJOCO
 
     def __post_init__(self) -> None:
-        _ = self.settings  # a name that stands for none is refused
+        _ = self.settings  # refuses an unknown name
 
     @property
     def name(self) -> str:
-        """Name of the controller, given or not."""
+        """Name of the controller, or its default."""
         if self.controller is None:
             return default_controller(self.planning is not None)
         return self.controller
 
     @property
     def settings(self) -> Control:
-        """The controller's settings, given or not."""
+        """Settings of the controller, or their default."""
         if self.control is None:
             return controller(self.scenario.control, self.name)
         return self.control
 
     @property
     def judged_as_disturbed(self) -> bool:
-        """Whether the tolerances for disturbed runs count, given or not."""
+        """Whether the tolerances for disturbed runs are used, given or by default."""
         return self.world != NO_DEVIATION if self.disturbed is None else self.disturbed
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Result:
-    """What a run gave: the verdict and all that it rests on; what ended it, if something did."""
+    """The result of a run: report, trace, contact history, and the error if one ended it."""
 
     report: Report
     trace: Trace
@@ -97,7 +97,7 @@ class Result:
     error: str | None = None
 
     def page(self) -> Page:
-        """Return the report, and what ended the run, if something did, as a page."""
+        """Return the report as a page, with the error that ended the run if there was one."""
         ended = "" if self.error is None else f"Ended by: {self.error}"
         return self.report.page() + page(ended)
 
@@ -110,16 +110,16 @@ def execute(
     progress: Progress | None = None,
     prepared: Preparation | None = None,
 ) -> Result:
-    """Runs to the end, or until interrupted (SIGINT, SIGTERM), and leaves a complete record.
+    """Run to the end, or until interrupted (SIGINT, SIGTERM), and write a complete record.
 
     Args:
-        request: What to run.
+        request: Run to make.
         progress: Called with steps done and steps in total after every block.
-        prepared: What :func:`prepare` gives for the request, where that has been done already.
+        prepared: Result of :func:`prepare` for the request; computed here if left out.
 
     Raises:
         PathError: The arms cannot follow the path; nothing has moved.
-        InvalidInputError: The scenario contradicts itself, or the folder holds something.
+        InvalidInputError: The scenario contradicts itself, or the folder is not empty.
         UnholdableError: The synthesis finds no forces somewhere on the path, and the request does
             not ask for the best effort.
         PlanError: The planned tilt breaks a limit.
@@ -153,7 +153,7 @@ def execute(
     histories: list[ContactHistory] = []
     error: str | None = None
     viewer_url = open_viewer() if request.live and out is not None else None
-    # From the first file to the last, so that none is missing.
+    # From the first file to the last a signal only stops the loop, so that no file is missing.
     with _quick_collections(), _StopSignal() as stop:
         if out is not None:
             out.mkdir(parents=True, exist_ok=True)
@@ -204,7 +204,7 @@ def execute(
 
 @contextlib.contextmanager
 def _quick_collections() -> Iterator[None]:
-    """Keeps the garbage collector from what is older than a run, which takes it 80 ms to search."""
+    """Exclude objects older than the run from garbage collection, which saves 80 ms each time."""
     gc.freeze()
     try:
         yield
@@ -213,7 +213,7 @@ def _quick_collections() -> Iterator[None]:
 
 
 class _StopSignal:
-    """Turns Ctrl-C and SIGTERM into a request to stop after the present block."""
+    """A handler that turns Ctrl-C and SIGTERM into a request to stop after the present block."""
 
     def __init__(self) -> None:
         self.requested = False
@@ -221,7 +221,7 @@ class _StopSignal:
 
     def __enter__(self) -> _StopSignal:
         if threading.current_thread() is not threading.main_thread():
-            return self  # signals go to the main thread, and only it may say what they do
+            return self  # only the main thread may set signal handlers
         for number in (signal.SIGINT, signal.SIGTERM):
             self._previous[number] = signal.signal(number, self._request)
         return self
@@ -235,7 +235,7 @@ class _StopSignal:
 
 
 def resolved_config(request: Request) -> dict[str, Any]:
-    """Everything that determines the run, for JSON; infinite limits become null."""
+    """Return everything that determines the run, for JSON; infinite limits become null."""
     return finite(
         {
             "controller": request.name,

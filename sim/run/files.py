@@ -1,4 +1,4 @@
-"""Output files as every part of fulcrum writes them."""
+"""Output folders and JSON files, for all parts of fulcrum."""
 
 from __future__ import annotations
 
@@ -14,7 +14,15 @@ from fulcrum.synthesis import InvalidInputError
 
 
 def check_new_folder(field: str, out: Path) -> None:
-    """Refuse a folder that is not empty, or that cannot be made."""
+    """Check that a folder is empty or can be made.
+
+    Args:
+        field: Name of the setting, for the message.
+        out: Folder.
+
+    Raises:
+        InvalidInputError: The folder is not empty, or cannot be made or written to.
+    """
     nearest = next(path for path in (out, *out.absolute().parents) if path.exists())
     if not nearest.is_dir() or (out.exists() and any(out.iterdir())):
         raise InvalidInputError(field, str(out), "a new or empty folder")
@@ -24,7 +32,7 @@ def check_new_folder(field: str, out: Path) -> None:
 
 
 def claim_folder(folder: Path) -> Path:
-    """Make a folder that no other process has, with -2, -3, .. behind its name if need be."""
+    """Make a folder that did not exist, and return it; -2, -3, .. is added to a name in use."""
     folder.parent.mkdir(parents=True, exist_ok=True)
     for number in itertools.count(1):
         claimed = folder if number == 1 else folder.with_name(f"{folder.name}-{number}")
@@ -35,12 +43,12 @@ def claim_folder(folder: Path) -> Path:
 
 
 def write_json(path: Path, content: Any) -> None:
-    """Writes a JSON file; infinite numbers, which JSON does not know, become null."""
+    """Write a JSON file; infinite and undefined numbers, which JSON does not know, become null."""
     path.write_text(json.dumps(finite(content), indent=2, allow_nan=False) + "\n")
 
 
 def finite(value: Any) -> Any:
-    """The value with infinite and undefined numbers, at any depth, replaced by None."""
+    """Return the value with infinite and undefined numbers, at any depth, replaced by None."""
     if isinstance(value, dict):
         return {key: finite(item) for key, item in value.items()}
     if isinstance(value, (list, tuple)):

@@ -1,4 +1,4 @@
-"""The closed loop: measured state, contact problem, torques, step; until done or stopped."""
+"""The closed loop: measured state, contact problem, torques, step, until the run ends."""
 
 from __future__ import annotations
 
@@ -15,19 +15,19 @@ from fulcrum.sim.signals import Measurement, Trace
 from fulcrum.sim.world import Motors, Pushes, Sensors, World
 from fulcrum.synthesis.arrays import Array
 
-# Time per block that is handed on while the loop runs [s]; what an abrupt end may lose.
+# Duration of a block of rows [s]; an abrupt end loses at most one block.
 _BLOCK_S = 0.25
 
 
 class ClosedLoop:
-    """One run of a scenario.
+    """The closed loop of one run.
 
     Attributes:
-        robot: The controller's model of the robots.
-        truth: What the plant is.
-        plant: What is controlled.
-        controller: What controls it.
-        steps: How many steps have been made.
+        robot: Model of the robots that the controller uses.
+        truth: True scenario, as the plant has it.
+        plant: Plant that is controlled.
+        controller: Controller of the plant.
+        steps: Number of steps made so far.
     """
 
     def __init__(
@@ -44,18 +44,18 @@ class ClosedLoop:
         """Put plant and controller at the start.
 
         Args:
-            scenario: What the controller believes.
-            robot: Its model of the robots.
-            truth: What the plant is.
-            plant: What is controlled.
-            controller: What controls it.
-            world: What disturbs sensors, motors and object.
-            start: Joint angles at the start [rad or m], (l,), but for small deviations.
-            seed: Draws the deviations of the start posture, and what is random in the controller.
+            scenario: Scenario that the controller assumes.
+            robot: Model of the robots that the controller uses.
+            truth: True scenario, as the plant has it.
+            plant: Plant that is controlled.
+            controller: Controller of the plant.
+            world: Disturbances of sensors, motors and object.
+            start: Joint positions at the start, before small deviations [rad or m], (l,).
+            seed: Seed of these deviations and of the controller's random numbers.
 
         Raises:
             InvalidInputError: The world does not fit the scenario.
-            DivergedError: The start's state is more than numbers can hold.
+            DivergedError: The state at the start is not finite.
         """
         self.robot, self.truth, self.plant, self.controller = robot, truth, plant, controller
         self._path = object_path(scenario.path)
@@ -74,19 +74,19 @@ class ClosedLoop:
 
     @property
     def trace(self) -> Trace:
-        """The run so far."""
+        """Trace of the run so far."""
         return self._trace.rows(0, self.steps)
 
     @property
     def total_steps(self) -> int:
-        """How many steps the run takes as things stand."""
+        """Expected number of steps of the run."""
         return self.steps + max(0, round(self.controller.left_s(self.steps * self._dt) / self._dt))
 
     def run(self) -> Iterator[Trace]:
-        """Step to the end, handing over each block of rows as soon as it is full.
+        """Step to the end, and yield each block of rows as soon as it is full.
 
         Raises:
-            DivergedError: The simulation has diverged; the rows before it have been handed over.
+            DivergedError: The simulation has diverged; the rows before it have been yielded.
         """
         while self.steps < self.total_steps:
             start = self.steps
@@ -109,10 +109,10 @@ class ClosedLoop:
                 raise diverged
 
     def _complete(self, block: Trace) -> None:
-        """Fill the columns that are worked out for a whole block at once."""
+        """Fill the columns that are computed for a whole block at once."""
         block.tilt[:] = self._path.tilt(block.quat_WO)
         self.plant.contacts(block)
-        # Where there is no contact its last place counts.
+        # Where there is no contact, its last place is used.
         steps, contacts = np.arange(len(block)), np.arange(block.p_WC.shape[1])
         touched = ~np.isnan(block.p_WC[..., 0])
         last = np.maximum.accumulate(np.where(touched, steps[:, None], 0), axis=0)

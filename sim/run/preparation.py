@@ -1,4 +1,4 @@
-"""What is planned before anything moves, and refused if it cannot be done."""
+"""Preparation of a run: plans, and checks that refuse an infeasible scenario before it moves."""
 
 from __future__ import annotations
 
@@ -18,12 +18,12 @@ from fulcrum.synthesis import (
     UnboundedError,
 )
 
-# Steps at which the path is checked for forces [deg].
+# Step of the tilt at which the path is checked for forces [deg].
 _CHECK_DEG = 5.0
 
 
 class UnholdableError(FulcrumError):
-    """Somewhere on the path no forces hold the object within all limits; nothing has moved."""
+    """No forces hold the object somewhere on the path; nothing has moved."""
 
     def __init__(self, explanation: Explanation) -> None:
         self.explanation = explanation
@@ -35,13 +35,15 @@ class UnholdableError(FulcrumError):
 
 @dataclass(frozen=True, eq=False)
 class Preparation:
-    """What depends on belief and controller alone, so that runs can share it.
+    """The plans of a run; runs in different worlds can share them.
+
+    They depend only on the controller and the scenario that it assumes.
 
     Attributes:
-        robot: The controller's model of the robots.
-        joint_path: How the arms follow the object's path.
-        grip: The least grip over the tilt; None for the control's preload alone.
-        execution: The planned tilt, with the scenario that it makes; None if it is not planned.
+        robot: Model of the robots that the controller uses.
+        joint_path: Joint path with which the arms follow the object's path.
+        grip: Least grip over the tilt; None for the preload of the control alone.
+        execution: Planned tilt, with the resulting scenario; None if it is not planned.
     """
 
     robot: RobotModel
@@ -59,22 +61,21 @@ def prepare(
     robot: RobotModel | None = None,
     check: bool = True,
 ) -> Preparation:
-    """Plans a run.
+    """Plan a run.
 
     Args:
-        scenario: What the controller believes.
-        control: The controller.
-        best_effort: Whether to go on where a certificate proves that no forces exist at one of the
-            path's tilts.
-        joint_path: The scenario's, where it is planned already.
+        scenario: Scenario that the controller assumes.
+        control: Settings of the controller.
+        best_effort: Whether to go on although a certificate proves that no forces exist at a tilt.
+        joint_path: Joint path of the scenario; planned here if left out.
         planning: How the tilt is planned; None for the scenario's own timing.
-        robot: The scenario's, where it is built already.
-        check: Whether to look for tilts without forces, where there is no best effort.
+        robot: Model of the scenario's robots; built here if left out.
+        check: Whether to look for tilts without forces; not done with `best_effort`.
 
     Raises:
         PathError: The arms cannot follow the path.
         PlanError: The planned tilt breaks a limit.
-        UnholdableError: Somewhere on it no forces hold the object.
+        UnholdableError: No forces hold the object somewhere on the path.
     """
     robot = robot or RobotModel(scenario)
     if planning is not None:
@@ -97,4 +98,4 @@ def _check(problems: PathProblems) -> None:
         except InfeasibleError:
             raise UnholdableError(explain(problems, tilt, synthesizer)) from None
         except (SolverError, UnboundedError):
-            continue  # no proof: the controller copes with those as they come
+            continue  # no proof of infeasibility: the controller handles it during the run

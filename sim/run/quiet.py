@@ -1,4 +1,4 @@
-"""What Dask loads first into each worker of a cluster of our own: Ctrl-C is the driver's alone."""
+"""Preload of each Dask worker of a local cluster: only the driver handles Ctrl-C."""
 
 from __future__ import annotations
 
@@ -8,5 +8,5 @@ from distributed import Worker
 
 
 def dask_setup(worker: Worker) -> None:
-    """Leaves interrupts, which a terminal sends to all processes, to the driver."""
+    """Ignore interrupts, which a terminal sends to all processes; the driver handles them."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)

@@ -1,4 +1,4 @@
-"""Capacities tried in closed loop."""
+"""Closed-loop trials of capacities."""
 
 from __future__ import annotations
 
@@ -11,26 +11,26 @@ from fulcrum.sim.scenario import Control, Scenario
 from fulcrum.sim.signals import Progress
 from fulcrum.synthesis.render import Bullets, Page, page
 
-# How many of its failures a page tells.
+# Largest number of failures on a page.
 _TOLD = 3
 
 
 @dataclass(frozen=True)
 class Trial:
-    """A closed-loop run with a share of the capacity.
+    """The result of a closed-loop run with a share of the capacity.
 
     Attributes:
-        share: Of the capacity [-].
-        weight: [N].
-        verdict: Of the run.
-        failures: What went wrong, in order of time.
-        failed_syntheses: How many found no forces, of ``syntheses``.
-        syntheses: How many there were.
-        torque_utilisation: Largest [-], at ``joint``.
-        joint: Which one.
+        share: Share of the capacity [-].
+        weight: Weight of the object [N].
+        verdict: Verdict of the run.
+        failures: Failures as sentences, in order of time.
+        failed_syntheses: Number of syntheses without forces.
+        syntheses: Number of all syntheses.
+        torque_utilisation: Largest used share of a torque limit [-].
+        joint: Joint with that share.
         saturated_fraction: Share of the time in which a torque was cut [-].
-        tilt_error_deg: Largest [deg].
-        slip_mm: Largest of all contacts [mm].
+        tilt_error_deg: Largest tilt error [deg].
+        slip_mm: Largest slip of all contacts [mm].
     """
 
     share: float
@@ -46,7 +46,7 @@ class Trial:
     slip_mm: float
 
     def page(self) -> Page:
-        """Return verdict, figures and the first failures as a page."""
+        """Return verdict, measurements and the first failures as a page."""
         return page(
             (
                 f"{100 * self.share:.0f} % ({self.weight:.4g} N) in closed loop: ",
@@ -68,14 +68,14 @@ def confirm(
     share: float,
     progress: Progress | None = None,
 ) -> Trial:
-    """Runs the closed loop with a share of the capacity; the inertia grows with the mass.
+    """Run the closed loop with a share of the capacity; the inertia is scaled with the mass.
 
     Args:
-        scenario: The scene.
+        scenario: Scene.
         controller: Name of the controller.
-        control: Its settings.
-        capacity: [N].
-        share: Of it [-].
+        control: Settings of the controller.
+        capacity: Largest weight that can be held [N].
+        share: Share of the capacity to run with [-].
         progress: Called with steps done and steps in total.
 
     Raises:

@@ -1,4 +1,4 @@
-"""The processes that compute many things at once: a Dask cluster, of this machine or given."""
+"""The processes for parallel computations: a Dask cluster, on this machine or a given one."""
 
 from __future__ import annotations
 
@@ -15,23 +15,24 @@ from distributed.comm.core import CommClosedError
 from fulcrum.synthesis import InvalidInputError
 from fulcrum.synthesis.checks import whole
 
-# How long a scheduler may take to answer, and its first worker to come [s].
+# Time limit for a scheduler to answer, and for its first worker to appear [s].
 _PATIENCE_S = 10
 _SETTINGS = {
-    # What workers have to say the driver says, or writes into rows.
+    # Workers do not log: the driver reports problems or writes them into rows.
     "distributed.nanny.pre-spawn-environ.DASK_LOGGING__DISTRIBUTED": "critical",
-    # Nobody reads Dask's profile, which it takes a hundred times a second in every process.
+    # Dask would profile every process a hundred times per second; the result is not used.
     "distributed.worker.profile.enabled": False,
 }
 
 
 @dataclass(frozen=True)
 class Workers:
-    """Who computes.
+    """The choice of processes that compute.
 
     Attributes:
-        count: Of processes on this machine; one for each of its processors if left out.
-        scheduler: Address of a running Dask cluster instead, whose workers have fulcrum installed.
+        count: Number of processes on this machine; by default one for each of its processors.
+        scheduler: Address of a running Dask cluster to use instead; fulcrum must be installed on
+            its workers.
     """
 
     count: int | None = None
@@ -51,7 +52,7 @@ LOCAL = Workers()
 
 @contextlib.contextmanager
 def cluster(workers: Workers) -> Iterator[Client]:
-    """A client of the cluster; one of its own processes ends with it.
+    """Yield a client of the cluster; a cluster on this machine is closed at the end.
 
     Raises:
         InvalidInputError: No cluster answers at the address.
@@ -65,7 +66,7 @@ def cluster(workers: Workers) -> Iterator[Client]:
                     n_workers=workers.count or os.cpu_count() or 1,
                     threads_per_worker=1,
                     processes=True,
-                    dashboard_address="127.0.0.1:0",  # only for its own use; there is no dashboard
+                    dashboard_address="127.0.0.1:0",  # for Dask itself; there is no dashboard
                     silence_logs=logging.CRITICAL,
                     preload="fulcrum.sim.run.quiet",
                 )

@@ -1,4 +1,4 @@
-"""Many runs in drawn worlds: design, episodes on workers, rows, rates."""
+"""Sweeps, many runs in randomly drawn worlds: design, episodes, results, success rates."""
 
 from fulcrum.sim.sweep.design import Sweep
 from fulcrum.sim.sweep.farm import SweepResult, run_sweep

@@ -1,4 +1,4 @@
-"""What a sweep is: which episodes there are, and the command that replays each of them."""
+"""The design of a sweep: its episodes, and the command that replays each of them."""
 
 from __future__ import annotations
 
@@ -16,19 +16,19 @@ from fulcrum.sim.world import ParameterGrid, World, draw, overridden, preset
 from fulcrum.synthesis import InvalidInputError
 from fulcrum.synthesis.checks import whole
 
-# More take days, and a task each in memory.
+# Largest number of episodes: more take days, and each needs a task in memory.
 _MOST = 100_000
 
 
 @dataclass(frozen=True)
 class Episode:
-    """One controller in one world.
+    """An episode: one controller in one world.
 
     Attributes:
-        number: Of the world within the sweep: all controllers meet the same ones.
-        controller: Name.
-        seed: Draws world and start posture.
-        values: What the grid sets of the world, by parameter.
+        number: Number of the world within the sweep; all controllers run in the same worlds.
+        controller: Name of the controller.
+        seed: Seed of world and start posture.
+        values: Values of the world's parameters that the grid sets, by parameter.
     """
 
     number: int
@@ -38,23 +38,23 @@ class Episode:
 
     @property
     def name(self) -> str:
-        """Unique in the sweep; fit for a file."""
+        """Name, unique in the sweep and valid as the name of a file."""
         return f"{self.number:07d}-{self.controller}"
 
 
 @dataclass(frozen=True)
 class Sweep:
-    """Every controller in every world; judged by the scenario's tolerances for disturbed runs.
+    """A sweep: every controller in every world, judged by the tolerances for disturbed runs.
 
     Attributes:
-        scenario: The scene, as the controllers believe it to be.
-        controllers: Names.
-        preset: Name of the uncertainty that worlds are drawn from.
-        episodes: Per controller and point of the grid.
-        seed: Of the first; the next have the next.
-        grid: What is set of the drawn worlds.
-        planning: How the tilt is planned, where the scenario is that of a planned tilt; else None.
-        called: How command lines name the scenario; by its name if empty.
+        scenario: Scenario that the controllers assume.
+        controllers: Names of the controllers.
+        preset: Name of the uncertainty from which worlds are drawn.
+        episodes: Number of episodes for each controller and point of the grid.
+        seed: Seed of the first episode; the next ones have the following numbers.
+        grid: Parameters of the drawn worlds that are set, with their values.
+        planning: How the tilt is planned, if the scenario is that of a planned tilt; else None.
+        called: Name of the scenario on command lines; its own name if empty.
     """
 
     scenario: Scenario
@@ -84,7 +84,7 @@ class Sweep:
                 overridden(drawn, self.scenario, {name: value}).truth(self.scenario)
 
     def all_episodes(self) -> list[Episode]:
-        """Every episode, world after world, so that controllers can be compared early on."""
+        """Return every episode, world after world, so that early results compare controllers."""
         points = [[(name, value) for value in values] for name, values in self.grid]
         worlds = itertools.product(range(self.episodes), itertools.product(*points))
         return [
@@ -94,12 +94,12 @@ class Sweep:
         ]
 
     def world(self, episode: Episode) -> World:
-        """The truth of an episode."""
+        """Return the true world of an episode."""
         drawn = draw(preset(self.preset), self.scenario, episode.seed)
         return overridden(drawn, self.scenario, dict(episode.values))
 
     def replay(self, episode: Episode) -> str:
-        """The command that runs an episode again, with a recording."""
+        """Return the command that runs an episode again, with a recording."""
         words = [
             f"fulcrum run {self.called or self.scenario.name} --controller {episode.controller}",
             f"--preset {self.preset} --seed {episode.seed}",
@@ -113,7 +113,7 @@ class Sweep:
         return " ".join(words)
 
     def config(self) -> dict[str, Any]:
-        """All that determines the episodes, for JSON."""
+        """Return everything that determines the episodes, for JSON."""
         known = controllers(self.scenario.control)
         return finite(
             {

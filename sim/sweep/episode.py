@@ -1,4 +1,4 @@
-"""One episode as a flat row: what was true, what was measured, and what a failure began with."""
+"""One episode as a flat row: its true world, its measurements, and the cause of a failure."""
 
 from __future__ import annotations
 
@@ -27,12 +27,12 @@ Row = dict[str, Any]
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Prepared:
-    """What all episodes of a sweep share, and what takes time: found once per process.
+    """The data that all episodes of a sweep share; they are computed once per process.
 
     Attributes:
-        sweep: The sweep.
+        sweep: Sweep of the episodes.
         controls: Settings by controller.
-        preparations: What is planned, by controller; the truth does not change it.
+        preparations: Plans by controller; they do not depend on the true world.
         joints: Names of the robot's joints.
     """
 
@@ -44,7 +44,7 @@ class Prepared:
 
 @lru_cache(maxsize=4)
 def prepared(packed: bytes) -> Prepared:
-    """The shared parts of a pickled sweep.
+    """Return the shared data of a pickled sweep.
 
     Raises:
         PathError: The arms cannot follow the path.
@@ -75,24 +75,24 @@ def _prepared(sweep: Sweep, controls: dict[str, Control]) -> dict[str, Preparati
 
 
 def check_holdable(sweep: Sweep) -> None:
-    """Refuses a sweep whose own scenario, without deviations, cannot be done.
+    """Check that the scenario of a sweep is feasible without deviations.
 
     Raises:
         PathError: The arms cannot follow the path.
         UnholdableError: A controller finds no forces somewhere on the path.
     """
     if sweep.planning is not None:
-        return  # there is a plan, or there would be no sweep of it
+        return  # a planned tilt has been checked by its plan
     known = controllers(sweep.scenario.control)
     for name in sweep.controllers:
         prepare(sweep.scenario, known[name])
 
 
 def run_episode(packed: bytes, episode: Episode) -> Row:
-    """Runs an episode of a pickled sweep without a recording.
+    """Run an episode of a pickled sweep without a recording.
 
-    A column's name is the path to its figure: ``world.`` is what was true, all else but the first
-    few as in a run's report.
+    The name of a column is the path to its value. Columns of the true world begin with ``world.``;
+    the others, after the first few, are named as in the report of a run.
     """
     shared = prepared(packed)
     sweep = shared.sweep
@@ -123,7 +123,7 @@ def run_episode(packed: bytes, episode: Episode) -> Row:
     )
     try:
         result = execute(request, prepared=shared.preparations[episode.controller])
-    except Exception as error:  # whatever ends an episode is its failure, not the sweep's
+    except Exception as error:  # any error fails the episode, not the sweep
         text = f"{type(error).__name__}: {error}"
         row |= {"cause": "error", "category": "error", "failed_at_s": 0.0, "error": text}
         row["outcome"] = unstarted(error)
@@ -135,14 +135,14 @@ def run_episode(packed: bytes, episode: Episode) -> Row:
 
 
 def unstarted(error: Exception) -> Outcome | None:
-    """Return the outcome of a run of which there is no step; None if that is a defect of ours."""
+    """Return the outcome of a run that ended before its first step; None for other errors."""
     if isinstance(error, DivergedError):
         return Outcome.DIVERGED
     return Outcome.REFUSED if isinstance(error, FulcrumError) else None
 
 
 def figures(shared: Prepared, result: Result) -> Row:
-    """Return a run's figures, its verdict and what a failure began with."""
+    """Return a run's measurements, its verdict and the cause of a failure."""
     scenario, trace, found = shared.sweep.scenario, result.trace, result.report.failures
     report = dataclasses.asdict(result.report)
     for whole_run in ("scenario", "controller", "seed", "disturbed", "recording", "phases"):
@@ -167,7 +167,7 @@ def figures(shared: Prepared, result: Result) -> Row:
 
 
 def _truths(world: World, scenario: Scenario, joints: tuple[str, ...]) -> Row:
-    """Every number of a world, by contact, hand or joint, and those that grids and maps know."""
+    """Return all numbers of a world by contact, hand or joint, and the parameters of grids."""
     names: dict[str, Sequence[str]] = {
         "friction": scenario.contact_names,
         "hand_place": tuple(hand.name for hand in scenario.hands),
@@ -182,7 +182,7 @@ def _truths(world: World, scenario: Scenario, joints: tuple[str, ...]) -> Row:
 
 
 def _flat(prefix: str, values: Mapping[str, Any]) -> Row:
-    """Nested values as one level of names with dots."""
+    """Return nested values as one level, with dots in the names."""
     row: Row = {}
     for key, value in values.items():
         if isinstance(value, (list, tuple)):

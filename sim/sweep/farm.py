@@ -1,4 +1,4 @@
-"""Episodes on many processes: a Dask cluster runs them, and each is kept as it finishes."""
+"""Episodes on many processes: a Dask cluster runs them, and each is stored when it finishes."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from fulcrum.sim.sweep.summary import Score, scores
 from fulcrum.synthesis import FulcrumError, InvalidInputError
 from fulcrum.synthesis.render import Lines, Page, page, table, to_markdown
 
-# How many causes of failures are named.
+# Largest number of causes of failures that are shown.
 _NAMED = 6
 
 # Called with episodes finished, episodes in total and failures so far.
@@ -27,7 +27,7 @@ SweepProgress = Callable[[int, int, int], None]
 
 
 class LostEpisodesError(FulcrumError):
-    """Some episodes took every worker down that tried them; the others are finished."""
+    """Some episodes ended every worker that tried them; the others are finished."""
 
     def __init__(self, names: list[str]) -> None:
         self.names = names
@@ -39,10 +39,10 @@ class LostEpisodesError(FulcrumError):
 
 @dataclass(frozen=True, eq=False)
 class SweepResult:
-    """Results of a sweep.
+    """The results of a sweep.
 
     Attributes:
-        rows: All episodes, one row each.
+        rows: Table of all episodes, one row each.
         scores: Success rate and causes of failure of each controller.
     """
 
@@ -79,7 +79,7 @@ class SweepResult:
 
 
 def _named(score: Score) -> str:
-    """Return the most frequent causes of a controller's failures."""
+    """Return the most frequent causes of a controller's failures as text."""
     named = ", ".join(f"{c.cause} ({c.episodes})" for c in score.causes[:_NAMED])
     more = len(score.causes) - _NAMED
     return (named or "none") + (f" and {more} more" if more > 0 else "")
@@ -90,21 +90,21 @@ def run_sweep(
 ) -> SweepResult:
     """Run the episodes that are missing in a folder.
 
-    Dask gives the episodes of a worker that dies to another one. What has been written survives
-    whatever happens to this process: another call with the same folder goes on from there.
+    If a worker dies, Dask gives its episodes to another one. Finished episodes stay in the folder
+    if this process ends: another call with the same folder resumes the sweep.
 
     Args:
         sweep: Controllers and worlds.
-        out: New or empty folder, or one of the same sweep.
+        out: Folder, which is new, empty or of the same sweep.
         workers: Processes or cluster that run the episodes.
-        progress: Called after each.
+        progress: Called after each episode.
 
     Raises:
         PathError: The arms cannot follow the path; nothing has been run.
         UnholdableError: A controller finds no forces somewhere on the path; nothing has been run.
         InvalidInputError: No cluster answers at the address, or the folder holds something else.
-        LostEpisodesError: Some episodes killed all workers that tried them.
-        KeyboardInterrupt: Somebody pressed Ctrl-C.
+        LostEpisodesError: Some episodes ended all workers that tried them.
+        KeyboardInterrupt: Ctrl-C was pressed.
     """
     store = Store(sweep, out)
     missing = store.missing()
@@ -129,8 +129,8 @@ def _run(
     report(done, total, failures)
     with cluster(workers) as client:
         store.begin()
-        packed = pickle.dumps(sweep)  # small, and sent along: what is scattered dies with workers
-        mark = uuid.uuid4().hex  # a shared cluster knows tasks of others
+        packed = pickle.dumps(sweep)  # sent with each task: scattered data are lost with a worker
+        mark = uuid.uuid4().hex  # tells our tasks from others on a shared cluster
         tasks = {
             client.submit(run_episode, packed, e, key=f"{e.name}-{mark}", pure=False): e
             for e in missing
@@ -145,7 +145,7 @@ def _run(
             except ImportError as error:
                 valid = "a cluster whose workers have this fulcrum installed"
                 raise InvalidInputError("--scheduler", f"{error}", valid) from None
-            store.write(episode, row)  # before it counts as finished
+            store.write(episode, row)  # before it is counted as finished
             done, failures = done + 1, failures + (not row["success"])
             report(done, total, failures)
     if lost:

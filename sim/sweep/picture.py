@@ -1,4 +1,4 @@
-"""The success map: where in the space of worlds each controller succeeds."""
+"""The success map: share of successes of each controller over two parameters of the world."""
 
 from __future__ import annotations
 
@@ -15,24 +15,24 @@ from fulcrum.sim.sweep.design import Sweep
 from fulcrum.sim.world import PARAMETERS
 from fulcrum.synthesis.arrays import Array
 
-# Of sampled parameters, which have no grid: so many bins a side.
+# Number of bins of a sampled parameter, which has no grid.
 _BINS = 8
-# Up to so many cells a side their numbers can be read.
+# Largest number of cells per side with numbers that can still be read.
 _WRITTEN = 12
 _COLORS = "RdYlGn"
 
 
 def draw_map(rows: pa.Table, sweep: Sweep, pair: tuple[str, str], path: Path) -> None:
-    """Draws the share of successes over two parameters as PNG, a panel for each controller.
+    """Draw the share of successes over two parameters as PNG, with a panel for each controller.
 
-    A parameter of the grid has a cell for each of its values; one that was drawn is binned, and
-    each failure is a cross.
+    A parameter of the grid has a cell for each of its values. A randomly drawn parameter is binned,
+    and each failure is a cross.
 
     Args:
-        rows: The episodes, at least one.
-        sweep: What they are of.
+        rows: Table of the episodes, at least one.
+        sweep: Sweep of the episodes.
         pair: Names of the parameters.
-        path: The picture to write.
+        path: Picture to write.
     """
     names = sweep.controllers
     figure = Figure(figsize=(0.8 + 4.4 * len(names), 4.6), layout="constrained")
@@ -64,7 +64,7 @@ def _cells(axes: Axes, x: Array, y: Array, success: Array, edges: list[Array]) -
     count = np.histogram2d(x, y, edges)[0]
     good = np.histogram2d(x[success], y[success], edges)[0]
     share = np.where(count > 0, good / np.maximum(count, 1), np.nan)
-    axes.set_facecolor("0.92")  # where no world was
+    axes.set_facecolor("0.92")  # cells without episodes
     axes.pcolormesh(*edges, share.T, cmap=_COLORS, norm=Normalize(0.0, 1.0), alpha=0.8)
     if max(count.shape) > _WRITTEN:
         return
@@ -75,7 +75,7 @@ def _cells(axes: Axes, x: Array, y: Array, success: Array, edges: list[Array]) -
 
 
 def _edges(values: Array, grid: tuple[float, ...] | None) -> Array:
-    """Edges of cells: around each value of a grid, or of bins over what was drawn."""
+    """Return the edges of cells: around each value of a grid, or of bins over drawn values."""
     if grid is None and np.ptp(values) > 0.0:
         return np.linspace(values.min(), values.max(), _BINS + 1)
     points = np.unique(values if grid is None else grid)

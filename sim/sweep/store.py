@@ -1,4 +1,4 @@
-"""A sweep's folder: what it is of, one file per finished episode, in the end all as one table."""
+"""The folder of a sweep: its configuration, one file per finished episode, and the final table."""
 
 from __future__ import annotations
 
@@ -23,18 +23,22 @@ CONFIG, PARTS, EPISODES, SUMMARY, MAP = (
     "sweep.json",
     "map.png",
 )
-# What helps to search many rows makes a file of one row twice as long.
+# Options for a file of one row, which is half as long without aids for searching.
 _LEAN = {"use_dictionary": False, "write_statistics": False}
 
 
 class Store:
-    """Keeps what has been finished: a row that :meth:`write` took outlives the process.
+    """The store of finished episodes: rows written by :meth:`write` survive the process.
 
-    The name of an episode's file is its own, so that none can be there twice.
+    Each episode has a file name of its own, so that it cannot be stored twice.
     """
 
     def __init__(self, sweep: Sweep, out: Path) -> None:
-        """Looks at a new or empty folder, or one of the same sweep, to go on with it.
+        """Check a folder, in which a sweep is begun or resumed.
+
+        Args:
+            sweep: Sweep to store.
+            out: Folder, which is new, empty or of the same sweep.
 
         Raises:
             InvalidInputError: The folder holds another sweep, or something else.
@@ -62,26 +66,26 @@ class Store:
             raise InvalidInputError("--out", given, valid)
 
     def begin(self) -> None:
-        """Makes the folder, if need be, and writes down what it is of."""
+        """Make the folder if necessary, and write the configuration of the sweep into it."""
         self._parts.mkdir(parents=True, exist_ok=True)
         partial = self._parts / f"{CONFIG}.partial"
         write_json(partial, self._config)
         partial.replace(self.folder / CONFIG)
 
     def missing(self) -> list[Episode]:
-        """The episodes that are not finished."""
+        """Return the episodes that are not finished."""
         if (self.folder / EPISODES).is_file():
             return []
         done = {path.stem for path in self._parts.glob("*.parquet")}
         return [episode for episode in self._episodes if episode.name not in done]
 
     def write(self, episode: Episode, row: Row) -> None:
-        """Keeps a finished episode: on the disk, and whole, when this returns."""
+        """Store a finished episode; the whole file is on the disk when this returns."""
         path = self._parts / f"{episode.name}.parquet"
         _write(pa.Table.from_pylist([row]), path, _LEAN)
 
     def read(self) -> pa.Table:
-        """All finished episodes in their order."""
+        """Return all finished episodes in their order."""
         whole = self.folder / EPISODES
         if whole.is_file():
             return pq.read_table(whole)
@@ -90,7 +94,7 @@ class Store:
         return pa.concat_tables(tables, promote_options="permissive") if tables else pa.table({})
 
     def merge(self) -> pa.Table:
-        """All episodes as one file, when none is missing; the files of each are removed."""
+        """Return all episodes, none missing, and write them to one file instead of many."""
         table = self.read()
         if not (self.folder / EPISODES).is_file():
             _write(table, self.folder / EPISODES, {"compression": "zstd"})
@@ -99,7 +103,7 @@ class Store:
 
 
 def _write(table: pa.Table, path: Path, options: dict[str, Any]) -> None:
-    """Writes a file that is there whole or not at all, whatever happens meanwhile."""
+    """Write a file atomically: it exists as a whole or not at all."""
     partial = path.with_suffix(".partial")
     with partial.open("wb") as file:
         pq.write_table(table, file, **options)

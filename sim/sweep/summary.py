@@ -1,4 +1,4 @@
-"""What a sweep's rows come to: how often each controller succeeds, and why not always."""
+"""The summary of a sweep: success rate and causes of failure of each controller."""
 
 from __future__ import annotations
 
@@ -14,13 +14,13 @@ _CONFIDENCE = 0.95
 
 @dataclass(frozen=True)
 class FailureCause:
-    """What failures began with.
+    """A cause of failures.
 
     Attributes:
-        cause: Category, and contact or joint.
-        episodes: How many.
-        share: Of all episodes of the controller [-].
-        replay: The command that shows the first of them.
+        cause: Category of the first failure, and its contact or joint.
+        episodes: Number of episodes with this cause.
+        share: Their share of all episodes of the controller [-].
+        replay: Command that replays the first of them.
     """
 
     cause: str
@@ -31,20 +31,21 @@ class FailureCause:
 
 @dataclass(frozen=True)
 class Score:
-    """One controller in all worlds.
+    """The score of one controller in all worlds.
 
     Attributes:
-        controller: Name.
-        episodes: How many there were.
-        successes: How many of them passed.
-        rate: Their share [-].
+        controller: Name of the controller.
+        episodes: Number of episodes.
+        successes: Number of episodes that passed.
+        rate: Share of episodes that passed [-].
         low, high: 95 % confidence interval of the rate (Clopper and Pearson 1934, exact) [-].
         grip_n: Median over the episodes of the largest normal force of a hand [N].
-        grip_max_n: The largest of all [N].
+        grip_max_n: Largest normal force of a hand in all episodes [N].
         friction: Median over the episodes of the largest share of its friction that a hand used
             while it held [-]; at 1 it slides.
-        force_error_n: The same of the RMS error of a hand's normal force [N].
-        causes: Of its failures, most frequent first.
+        force_error_n: Median over the episodes of the largest RMS error of a hand's normal force
+            [N].
+        causes: Causes of the failures, most frequent first.
     """
 
     controller: str
@@ -61,10 +62,10 @@ class Score:
 
 
 def scores(rows: pa.Table, hands: tuple[str, ...]) -> tuple[Score, ...]:
-    """The scores of the controllers, in the order in which they come.
+    """Return the scores of the controllers, in the order of their first rows.
 
     Args:
-        rows: At least one.
+        rows: Table of the episodes, at least one.
         hands: Names of the hands.
     """
     every = rows.to_pylist()
@@ -75,7 +76,7 @@ def scores(rows: pa.Table, hands: tuple[str, ...]) -> tuple[Score, ...]:
 def _score(name: str, rows: list[dict], hands: tuple[str, ...]) -> Score:
     successes = sum(row["success"] for row in rows)
     interval = binomtest(successes, len(rows)).proportion_ci(_CONFIDENCE, method="exact")
-    # Episodes that ended in an error have no figures.
+    # Episodes that ended in an error have no measurements.
     done = [row for row in rows if row.get(f"contacts.{hands[0]}.max_normal_n") is not None]
     grips, friction, errors = (
         [max(row[f"contacts.{hand}.{figure}"] for hand in hands) for row in done] or [0.0]
