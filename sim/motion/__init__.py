@@ -1,4 +1,4 @@
-"""How object and arms are to move: schedule, inverse kinematics, references, path time."""
+"""Planned motion of object and arms: schedule, inverse kinematics, references, path time."""
 
 from fulcrum.sim.motion.clock import PathClock
 from fulcrum.sim.motion.ik import plan_joints

@@ -1,31 +1,31 @@
-"""Path time: where on the schedule a run is, which may stand still or run backwards."""
+"""Path time: the time on the schedule, which may stand still or run backwards."""
 
 from __future__ import annotations
 
-# How fast the rate of path time changes [1/s]: from running to standing in 0.2 s.
+# Slope of the rate of path time [1/s]: from running to standing in 0.2 s.
 _RAMP = 5.0
 
 
 class PathClock:
-    """Path time that follows the plant's time with a delay, which changes while the rate is not 1.
+    """Path time: the plant's time minus a delay, which changes while the rate is not 1.
 
     Attributes:
         delay: Plant's time minus path time [s].
-        rate: Seconds of path per second [-].
-        change: How fast that changes [1/s].
+        rate: Rate of path time [s/s].
+        change: Derivative of the rate [1/s].
     """
 
     def __init__(self, timestep: float) -> None:
-        """Starts in step with the plant's time, which ticks in steps [s]."""
+        """Start at the plant's time, with a time between ticks of `timestep` [s]."""
         self._timestep = timestep
         self.delay, self.rate, self.change = 0.0, 1.0, 0.0
 
     def at(self, t: float, rate: float) -> float:
-        """Path time at the next tick [s], not before the path's start.
+        """Return the path time at the next tick [s], at least 0.
 
         Args:
-            t: The plant's time [s].
-            rate: What the clock's rate is to be brought to, along a ramp.
+            t: Plant's time [s].
+            rate: Target of the clock's rate [s/s], which is approached along a ramp.
         """
         if self.rate != 1.0 or rate != 1.0:
             before, change = self.rate, _RAMP * self._timestep

@@ -1,4 +1,4 @@
-"""Joint path for the object's path: mink solves for the arms, and says which limit stops it."""
+"""Joint path for the object's path by inverse kinematics with mink; names limits that stop it."""
 
 from __future__ import annotations
 
@@ -32,25 +32,27 @@ _ITERATIONS = 50
 _SOLVED = 1e-9
 # Gauss-Newton damping: small against the squared singular values of the task (> 0.01).
 _DAMPING = 1e-8
-# Longest step of a joint while the start is sought [rad or m]: longer ones leave the region where
-# the task is linear, and an arm that is out of reach ends far from it, at limits of no concern.
+# Longest step of a joint in the search of the start [rad or m]. With longer ones the linear model
+# fails: an arm out of reach ends far from its target, at limits that are not the cause.
 _START_STEP = 0.05
-# How near to a limit counts as being at it [rad, m, or share of the speed limit].
+# Distance within which a limit counts as reached [rad, m, or share of the speed limit].
 _AT_LIMIT = 1e-3
 _NAMED_COLLISIONS = 3
-# Damping of joints that are to keep still: large against the others', so that those move instead.
+# Damping of joints that should keep still: large against that of the others, which move instead.
 _STILL_DAMPING = 1e-2
 
 
 def plan_joints(
     scenario: Scenario, solved: float = _SOLVED, grid: JointGrid | None = None
 ) -> JointPath:
-    """Follows the manoeuvre with all hands, within joint, speed and collision limits.
+    """Return joint angles with which all hands follow the manoeuvre within all limits.
+
+    The limits are those of joint angles, speeds and collisions.
 
     Args:
         scenario: The scene.
         solved: Pose error at which a step counts as solved [m and rad].
-        grid: Steps; those of :class:`JointGrid` if left out.
+        grid: Steps of the joint path; the defaults of :class:`JointGrid` if left out.
 
     Raises:
         PathError: A limit stops the arms; names it and the tilt.
@@ -71,7 +73,7 @@ class _Follower:
         self._schedule = Schedule(scenario)
         self._frames = ContactFrames(scenario)
         spec = compose(scenario, ObjectMotion.POSED)
-        # mink leaves out geoms that physics would not let collide; no physics runs in this scene.
+        # mink ignores geoms that cannot collide in the physics, which does not run in this scene.
         for geom in spec.geoms:
             geom.contype = geom.conaffinity = 1
         self._model = model = spec.compile()
@@ -101,7 +103,7 @@ class _Follower:
     def follow(self) -> JointPath:
         phases = self._schedule.phases
         touched = next((i for i, p in enumerate(phases) if p.gap == 0.0), len(phases) - 1)
-        # The approach is planned backwards, so that the arms hold from the posture that was sought.
+        # The posture at the first contact is solved first; the approach is planned back from it.
         self._steps = 1 + sum(len(self._targets(i)[1]) - 1 for i in range(len(phases)))
         self._reach(_Target(phases[touched].tilt * self._path.end, phases[touched].gap), None)
         holding = self._configuration.q.copy()
@@ -115,7 +117,7 @@ class _Follower:
         return JointPath(self._schedule, tuple(progress), tuple(q), clearance)
 
     def _follow(self, index: int, backwards: bool = False) -> tuple[Array, Array]:
-        """Grid of a phase's progress, and the motors' angles there; starts where the arms are."""
+        """Return a phase's grid of progresses and the motors' angles, starting at the present."""
         grid, targets = self._targets(index)
         durations = np.diff(self._schedule.times(index, grid))
         if backwards:
@@ -128,7 +130,7 @@ class _Follower:
         return grid, q[::-1] if backwards else q
 
     def _targets(self, index: int) -> tuple[Array, list[_Target]]:
-        """Grid of a phase's progress, fine enough for its motion, and what to reach there."""
+        """Return a phase's grid of progresses and the target at each of them."""
         phase, before = self._schedule.phases[index], self._schedule.before(index)
         own = self._grid
         degrees = abs(phase.tilt - before.tilt) * np.degrees(self._path.end)
@@ -140,11 +142,11 @@ class _Follower:
         return grid, [_Target(float(t), float(g)) for t, g in zip(tilts, gaps, strict=True)]
 
     def _reach(self, target: _Target, duration: float | None) -> None:
-        """Brings the hands to a target, within a duration [s] if one is given."""
+        """Bring the hands to a target, within a duration [s] if one is given."""
         self._pose_object(target.tilt)
         for task, pose in zip(self._tasks, self._tip_poses(target), strict=True):
             task.set_target(pose)
-        # Without a duration one iteration counts as a second, and its speed limit as a step.
+        # Without a duration each iteration is a step of 1 s, so speed limits are limits of steps.
         dt, speeds = 1.0, np.full_like(self._qd_max, _START_STEP)
         if duration is not None:
             dt, speeds = duration, self._qd_max
@@ -170,13 +172,13 @@ class _Follower:
         too_fast = np.zeros(len(moved), bool)
         if duration is not None:
             too_fast = moved >= (1.0 - _AT_LIMIT) * duration * self._qd_max
-        if not self._error() < self._solved or too_fast.any():  # a NaN is no solution
+        if not self._error() < self._solved or too_fast.any():  # also true for NaN
             reasons, share = self._reasons(too_fast), self._done / self._steps
             raise PathError(target.tilt, target.gap, self._error(), reasons, share)
         self._done += 1
 
     def _tip_poses(self, target: _Target) -> list[mink.SE3]:
-        """Poses in the world of the hands' tips that face their contacts across the gap."""
+        """Return the poses of the hands' tips in the world, at the gap from their contacts."""
         R_WO, p_WO = self._path.pose(target.tilt)
         R_WC = self._frames.in_world(R_WO)
         p_WC = self._frames.points(R_WO, p_WO)

@@ -1,4 +1,4 @@
-"""How the arms follow the object's path, as tabulated joint angles."""
+"""Joint angles of the arms along the object's path, as a table."""
 
 from __future__ import annotations
 
@@ -17,13 +17,13 @@ from fulcrum.synthesis.arrays import Array
 class JointGrid:
     """Steps of a joint path.
 
-    A cubic spline through the steps left out here follows the hands to under a micrometre.
+    The defaults are fine enough: a cubic spline through the steps places the hands to within 1 um.
 
     Attributes:
         tilt_deg: Largest step of the tilt [deg].
         gap_m: Largest step of the hands' distance from their contacts [m].
-        least: Steps of a phase, at least.
-        clearance_m: That links keep from each other and from the scene at the steps [m].
+        least: Smallest number of steps of a phase.
+        clearance_m: Least distance of links from each other and from the scene at the steps [m].
     """
 
     tilt_deg: float = 1.0
@@ -33,12 +33,12 @@ class JointGrid:
 
 
 class PathError(FulcrumError):
-    """The arms cannot follow the object's path; says at which tilt, and which limit stops.
+    """The arms cannot follow the object's path; names the tilt and the limits that stop them.
 
     Attributes:
-        tilt_deg: [deg].
-        error: Of the hands' poses where they got stuck [m and rad].
-        share: Of the manoeuvre's steps, as they are planned, that were solved before [-].
+        tilt_deg: Tilt at which the arms stop [deg].
+        error: Pose error of the hands there [m and rad].
+        share: Share of the manoeuvre's steps that were solved before, in planning order [-].
         reasons: Limits that stop the arms.
     """
 
@@ -60,8 +60,8 @@ class JointPath:
 
     Attributes:
         schedule: The phases.
-        progress: Grid of progresses of each phase, (k,).
-        q: Joint angles [rad or m] of each phase at its grid, (k, l), in the order of the motors.
+        progress: Grid of progresses of each phase [-], (k,).
+        q: Joint angles of each phase at its grid [rad or m], (k, l), in the order of the motors.
         clearance: Smallest distance to a joint limit over the manoeuvre [rad or m], (l,).
     """
 
@@ -76,23 +76,23 @@ class JointPath:
 
     @property
     def start(self) -> Array:
-        """Where the manoeuvre starts, (l,)."""
+        """Joint angles at the start of the manoeuvre [rad or m], (l,)."""
         return self.q[0][0]
 
     def at(self, phase: int, progress: Array | float) -> tuple[Array, Array]:
-        """Angles, (..., l), at progresses, (...), of a phase, and their derivatives by it."""
+        """Return angles and their derivatives, (..., l) each, at progresses, (...), of a phase."""
         spline = self._splines[phase]
         return spline(progress), spline(progress, 1)
 
     def curvature(self, phase: int, progress: Array | float) -> Array:
-        """Second derivatives of the angles by the progress of a phase, (..., l)."""
+        """Return the second derivatives of the angles by a phase's progress, (..., l)."""
         return self._splines[phase](progress, 2)
 
     def holding(self, tilt: float) -> Array:
-        """Angles, (l,), that hold the object at a tilt of the path [rad].
+        """Return the angles [rad or m], (l,), that hold the object at a tilt [rad].
 
         Raises:
-            InvalidInputError: The manoeuvre does not come through that tilt.
+            InvalidInputError: The manoeuvre does not pass through that tilt.
         """
         end = self.schedule.end
         for index, phase in enumerate(self.schedule.phases):

@@ -1,4 +1,4 @@
-"""What the controller follows, tabulated for a whole run: it depends on time alone."""
+"""References of the controller for a whole run, as a table over time."""
 
 from __future__ import annotations
 
@@ -10,13 +10,13 @@ from fulcrum.synthesis.arrays import Array
 
 
 class References:
-    """A joint path's references at the ticks of a clock, found in one go."""
+    """References of a joint path, computed at once for all ticks of a clock."""
 
     def __init__(self, path: JointPath, timestep: float) -> None:
-        """Takes a path, and the time between ticks [s]."""
+        """Compute the references of a path, with a time between ticks of `timestep` [s]."""
         self._path, self._timestep = path, timestep
         ticks = round(path.schedule.total_s / timestep)
-        # A plant's clock adds up its steps, with their rounding.
+        # A cumulative sum, since the plant's clock adds up its steps with the same rounding.
         times = np.concatenate([[0.0], np.cumsum(np.full(ticks, timestep))])
         asked = path.schedule.at(times)
         self._q = np.empty((len(times), len(path.start)))
@@ -25,7 +25,7 @@ class References:
             rows = asked.phase == phase
             progress = asked.progress[rows], asked.rate[rows, None], asked.acceleration[rows, None]
             self._q[rows], self._qd[rows], self._qdd[rows] = _motion(path, phase, *progress)
-        # Python's own numbers, which are read off several times faster one by one.
+        # Python numbers: reading them one by one is several times faster than from an array.
         self._times = times.tolist()
         rate, acceleration = asked.turn * asked.rate, asked.turn * asked.acceleration
         self._phase, self._tilt, self._grip, self._rate, self._acceleration = (
@@ -33,7 +33,7 @@ class References:
         )
 
     def at(self, t: float) -> Target:
-        """References at a time [s]; read off at ticks, computed between them and after the end."""
+        """Return the references at a time [s]: from the table at ticks, computed at other times."""
         row = round(t / self._timestep)
         if row < len(self._times) and self._times[row] == t:
             return Target(
@@ -56,7 +56,7 @@ class References:
 def _motion(
     path: JointPath, phase: int, progress: Array, rate: Array, acceleration: Array
 ) -> tuple[Array, Array, Array]:
-    """Angles, speeds and accelerations of the joints at a phase's progress and its derivatives."""
+    """Return angles, speeds and accelerations of the joints at a phase's progress and its rates."""
     q, slope = path.at(phase, progress)
     curvature = path.curvature(phase, progress)
     return q, slope * rate, slope * acceleration + curvature * rate**2

@@ -1,4 +1,4 @@
-"""When the phases of a manoeuvre are, and what each asks for at any time."""
+"""The phases of a manoeuvre over time, and the reference at any time."""
 
 from __future__ import annotations
 
@@ -16,13 +16,13 @@ from fulcrum.synthesis.arrays import Array, Mask
 
 @dataclass(frozen=True)
 class Reference:
-    """What is asked for at an instant, or at many: numbers, or arrays over the instants.
+    """The reference at one instant (numbers) or at many (arrays).
 
     Attributes:
         phase: Index of the phase.
-        progress: How much of the phase's motion is done [-], 0 to 1.
+        progress: Progress of the phase's motion [-], 0 to 1.
         rate, acceleration: First and second derivatives of the progress [1/s, 1/s^2].
-        tilt: [rad].
+        tilt: Tilt [rad].
         turn: Derivative of the tilt by the progress [rad].
         grip: Share of the synthesised forces [-].
     """
@@ -41,7 +41,7 @@ class Schedule:
 
     Attributes:
         phases: The phases in order.
-        starts, ends: When they start and end [s], (p,).
+        starts, ends: Times at which they start and end [s], (p,).
         end: Tilt at the end of the path [rad].
     """
 
@@ -67,11 +67,11 @@ class Schedule:
         return float(self.ends[-1])
 
     def before(self, phase: int) -> Phase:
-        """The phase before, whose end is this one's start."""
+        """Return the phase before, whose end is the start of the given one."""
         return self._before[phase]
 
     def at(self, t: Array | float) -> Reference:
-        """What is asked for at times t [s]; after the end, what the last phase ended with."""
+        """Return the reference at times t [s]; after the end, that at the end."""
         index = np.minimum(np.searchsorted(self.ends, t, side="right"), len(self.phases) - 1)
         elapsed, duration = t - self.starts[index], self._durations[index]
         progress, rate, acceleration = minimum_jerk(elapsed / duration)
@@ -93,7 +93,7 @@ class Schedule:
         )
 
     def times(self, phase: int, progress: Array) -> Array:
-        """When a phase reaches progresses that rise from 0 to 1, counted from its start [s]."""
+        """Return the times [s] from a phase's start at progresses that increase from 0 to 1."""
         if (timing := self.phases[phase].timing) is not None:
             return timing.times(progress)
         x = np.linspace(0.0, 1.0, 10_001)
@@ -101,12 +101,12 @@ class Schedule:
 
     @cached_property
     def held(self) -> Mask:
-        """Which phases hold the object with full grip: contacts are accountable, (p,)."""
+        """Mask of the phases with full grip throughout, in which contacts are judged, (p,)."""
         return self._grips == 2.0
 
     @cached_property
     def free(self) -> Mask:
-        """Which phases ask for no grip at any time, (p,)."""
+        """Mask of the phases without grip throughout, (p,)."""
         return self._grips == 0.0
 
     @property

@@ -1,4 +1,4 @@
-"""What passes between the parts of the loop at run time, and the trace of it all."""
+"""Data passed between the parts of the loop at run time, and the trace of a run."""
 
 from fulcrum.sim.signals.command import Command
 from fulcrum.sim.signals.event import Cause, Event, Finding, Mode, Reaction

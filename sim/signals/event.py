@@ -1,4 +1,4 @@
-"""What a run is doing, what was found wrong, and what was done about it."""
+"""Modes of a run, and events: causes of trouble and the guard's reactions."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 
 class Mode(IntEnum):
-    """What a run is doing; a trace holds the number."""
+    """Mode of a run; a trace holds the number."""
 
     RUN = 0
     HOLD = 1
@@ -17,7 +17,7 @@ class Mode(IntEnum):
 
 
 class Cause(StrEnum):
-    """Why a run does not go on."""
+    """Cause for which the guard intervenes."""
 
     ENCODER = "encoder"
     MOTOR = "motor"
@@ -31,7 +31,7 @@ class Cause(StrEnum):
 
 
 class Reaction(StrEnum):
-    """What the guard did."""
+    """Reaction of the guard."""
 
     HOLD = "hold"
     RUN = "run"
@@ -41,7 +41,7 @@ class Reaction(StrEnum):
 
 
 class Finding(NamedTuple):
-    """A cause that is there now, and in words what was found."""
+    """A cause that is present now, and its description in words."""
 
     cause: Cause
     text: str
@@ -49,13 +49,13 @@ class Finding(NamedTuple):
 
 @dataclass(frozen=True)
 class Event:
-    """What was found, when, and what was done.
+    """A reaction of the guard, with time and cause.
 
     Attributes:
         t: Time [s].
-        cause: What was found; of ``run`` what has passed, of ``end`` why the object was lowered.
-        reaction: What was done.
-        text: What was found, in words.
+        cause: Cause found; for ``run`` the cause that has passed, for ``end`` that of the lowering.
+        reaction: Reaction of the guard.
+        text: Description of the cause in words.
     """
 
     t: float

@@ -1,4 +1,4 @@
-"""A force that the surroundings apply to the object."""
+"""An external force on the object."""
 
 from __future__ import annotations
 
@@ -11,8 +11,8 @@ class AppliedForce(NamedTuple):
     """A force on the object during one step.
 
     Attributes:
-        force_W: In world axes [N], (3,).
-        p_OA_O: Where it acts, in the object frame [m], (3,); None for the centre of mass.
+        force_W: Force in world axes [N], (3,).
+        p_OA_O: Point of application in the object frame [m], (3,); None for the centre of mass.
     """
 
     force_W: Array

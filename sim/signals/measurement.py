@@ -1,4 +1,4 @@
-"""What the controller gets to know at one instant."""
+"""Measured state at one instant."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from fulcrum.synthesis.arrays import Array
 
 
 class Measurement(NamedTuple):
-    """The state of joints and object at one instant, as it is or as sensors give it.
+    """The state of joints and object at one instant, true or as measured by sensors.
 
     Attributes:
         t: Time [s].
@@ -16,7 +16,7 @@ class Measurement(NamedTuple):
         qd: Joint speeds [rad/s or m/s], (l,).
         p_WO: Position of the object [m], (3,).
         quat_WO: Orientation of the object, (4,), wxyz.
-        tau: What the motors made during the last step [N·m or N], (l,).
+        tau: Motor torques during the last step [N·m or N], (l,).
     """
 
     t: float

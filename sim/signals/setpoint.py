@@ -1,4 +1,4 @@
-"""What the outer loop tells the drives."""
+"""Setpoint from the outer loop to the drives."""
 
 from __future__ import annotations
 
@@ -8,11 +8,11 @@ from fulcrum.synthesis.arrays import Array
 
 
 class Setpoint(NamedTuple):
-    """Forces that the drives are to make until the next setpoint arrives.
+    """Forces that the drives apply until the next setpoint arrives.
 
     Attributes:
-        tau_f: Torques that make the contact forces [N·m or N], (l,).
-        w_commanded_C: Those forces on the object in contact axes [N, N·m], (m, 6).
+        tau_f: Torques that produce the contact forces [N·m or N], (l,).
+        w_commanded_C: Commanded wrenches on the object in contact axes [N, N·m], (m, 6).
         J_C: Jacobians of the hands in contact axes, (n, 6, l).
     """
 

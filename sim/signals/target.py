@@ -12,12 +12,12 @@ class Target(NamedTuple):
 
     Attributes:
         phase: Index of the phase.
-        tilt: [rad].
+        tilt: Tilt [rad].
         grip: Share of the synthesised forces [-].
         q: Joint angles [rad or m], (l,).
         qd: Joint speeds [rad/s or m/s], (l,).
-        rate, acceleration: Of the tilt [rad/s, rad/s^2].
-        qdd: Joint accelerations [rad/s^2 or m/s^2], (l,); None for none.
+        rate, acceleration: First and second derivatives of the tilt [rad/s, rad/s^2].
+        qdd: Joint accelerations [rad/s^2 or m/s^2], (l,), or None.
     """
 
     phase: int
@@ -30,7 +30,10 @@ class Target(NamedTuple):
     qdd: Array | None = None
 
     def on_clock(self, rate: float, change: float) -> Target:
-        """The same place, come through at a rate of path time [-] that changes [1/s]."""
+        """Return the target for a rate of path time [s/s] and its derivative `change` [1/s].
+
+        Position, phase and grip are unchanged; speeds and accelerations follow the chain rule.
+        """
         qdd = None if self.qdd is None else rate**2 * self.qdd + change * self.qd
         acceleration = rate**2 * self.acceleration + change * self.rate
         return self._replace(

@@ -1,4 +1,4 @@
-"""The trace of a run: everything that happened, one row per physics step."""
+"""The trace of a run: all signals, one row per physics step."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from fulcrum.synthesis.arrays import Array, Mask
 
 
 def stretches(flags: Mask) -> NDArray[np.intp]:
-    """How many steps in a row a flag has been set at each step, (k,) of (k,)."""
+    """Return the number of consecutive steps up to each step with the flag set, (k,), of (k,)."""
     steps = np.arange(1, len(flags) + 1)
     return steps - np.maximum.accumulate(np.where(flags, 0, steps))
 
@@ -23,7 +23,7 @@ class Trace:
     Row i holds the state before step i, and the torques and contact forces during it.
 
     Attributes:
-        t: (k,).
+        t: Time [s], (k,).
         phase: Index of the phase, (k,).
         mode: Number of the :class:`sim.signals.event.Mode`, (k,).
         tilt_ref, rate_ref: Reference tilt [rad] and its rate [rad/s], (k,).
@@ -31,14 +31,14 @@ class Trace:
         p_WO, quat_WO, twist_WO: Object pose and twist (linear first), (k, 3 | 4 | 6).
         q, qd, q_ref: Joint state and reference, (k, l).
         tau: Applied torques, (k, l).
-        saturated: Torques that were cut at their limit, (k, l).
+        saturated: Mask of the torques cut at their limit, (k, l).
         p_WE, quat_WE, twist_WE: Tip poses and twists, (k, n, 3 | 4 | 6).
-        p_WC: Where the plant's contacts are, (k, m, 3); the last place where there is none.
+        p_WC: Places of the plant's contacts, (k, m, 3); an open contact keeps its last place.
         f_W: Force on the object and torsional moment about the normal into it, (k, m, 4).
         w_commanded_C: Commanded wrenches on the object in contact axes, (k, m, 6).
         synthesis_s: Wall time of the synthesis; 0 where none was due, (k,).
-        failed: Syntheses without solution, (k,).
-        collisions: Contacts that the scenario does not want, (k,).
+        failed: Mask of the syntheses without solution, (k,).
+        collisions: Number of contacts that the scenario does not want, (k,).
     """
 
     t: Array
@@ -67,7 +67,7 @@ class Trace:
 
     @staticmethod
     def allocate(steps: int, joints: int, hands: int, contacts: int) -> Trace:
-        """Return an all-zero trace, to be filled row by row."""
+        """Return a trace of zeros, to be filled row by row."""
         shapes = {
             **dict.fromkeys(("q", "qd", "q_ref", "tau", "saturated"), (joints,)),
             "p_WO": (3,),
@@ -92,7 +92,7 @@ class Trace:
         )
 
     def grown(self, steps: int) -> Trace:
-        """A copy with room for so many steps more, all-zero."""
+        """Return a copy with `steps` additional rows of zeros."""
         arrays = {f.name: getattr(self, f.name) for f in fields(self)}
         room = {n: np.zeros((steps, *a.shape[1:]), a.dtype) for n, a in arrays.items()}
         return Trace(**{n: np.concatenate([a, room[n]]) for n, a in arrays.items()})
@@ -101,14 +101,14 @@ class Trace:
         return len(self.t)
 
     def rows(self, start: int, stop: int) -> Trace:
-        """Views of the rows from start to before stop."""
+        """Return views of the rows from start to before stop."""
         return Trace(**{f.name: getattr(self, f.name)[start:stop] for f in fields(self)})
 
     def pick(self, rows: NDArray[np.intp]) -> Trace:
-        """Copies of the rows with the given indices."""
+        """Return copies of the rows with the given indices."""
         return Trace(**{f.name: getattr(self, f.name)[rows] for f in fields(self)})
 
 
 def torque_shares(tau: Array, tau_min: Array, tau_max: Array) -> Array:
-    """Sizes of torques, (..., l), over the limits on their side [-]."""
+    """Return the magnitudes of torques, (..., l), over the limits in their direction [-]."""
     return np.maximum(tau / tau_max, tau / tau_min)

@@ -1,4 +1,4 @@
-"""What is true beyond the belief, and what disturbs a run: drawn by seed, applied to signals."""
+"""True deviations from the scenario and disturbances of a run, drawn by seed."""
 
 from fulcrum.sim.world.channel import Channel
 from fulcrum.sim.world.motors import Motors

@@ -1,4 +1,4 @@
-"""The wire from the outer loop to the drives: what is sent arrives late, or not at all."""
+"""Transmission from the outer loop to the drives, with latency and losses."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from fulcrum.sim.world.world import World
 
 
 class Channel:
-    """Delivers setpoints after the world's latency; some get lost."""
+    """A channel that delivers setpoints after the world's latency and loses some of them."""
 
     def __init__(self, world: World) -> None:
         self._latency, self._dropped = world.latency, world.dropped
@@ -21,18 +21,18 @@ class Channel:
         self._sent: deque[tuple[float, Setpoint]] = deque()
 
     def send(self, t: float, setpoint: Setpoint) -> None:
-        """Takes a setpoint that was worked out from the measurement at a time [s]."""
+        """Send a setpoint that was computed from the measurement at time t [s]."""
         if self._dropped > 0.0 and self._random.random() < self._dropped:
             return
         self._sent.append((t + self._latency, setpoint))
 
     def receive(self, t: float) -> Setpoint | None:
-        """The newest setpoint that has arrived since last asked; None if there is none."""
+        """Return the newest setpoint that has arrived since the last call; None without one."""
         newest = None
         for silence in self._silences:
             if silence.active(t):
                 return None
-        # Times are sums of steps, and so is the latency: half a nanosecond is rounding.
+        # Times and latency are sums of steps: half a nanosecond is rounding.
         while self._sent and self._sent[0][0] <= t + 5e-10:
             newest = self._sent.popleft()[1]
         return newest

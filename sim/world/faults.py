@@ -1,4 +1,4 @@
-"""What may break during a run: in the sensors, on the wire, in the motors, or on the object."""
+"""Faults during a run: in sensors, transmission or motors, or on the object."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from fulcrum.synthesis.checks import not_negative
 
 
 class FaultKind(StrEnum):
-    """What breaks; each is injected where it would arise, never in the controller."""
+    """Kind of a fault. Each is injected where it would occur, never in the controller."""
 
     TORQUE_LOST = "torque lost"
     TORQUE_STUCK = "torque stuck"
@@ -25,7 +25,7 @@ class FaultKind(StrEnum):
 
     @property
     def at_joint(self) -> bool:
-        """Whether it befalls one joint."""
+        """Whether the fault is one of a single joint."""
         return self in _AT_JOINT
 
 
@@ -39,17 +39,17 @@ _AT_JOINT = (
 
 @dataclass(frozen=True)
 class Fault:
-    """One thing that breaks, and for how long.
+    """A fault of one component, with start and duration.
 
-    A lost torque is 0 and a stuck one stays what it was; a frozen sensor repeats its last value and
-    a dead one gives NaN; in a silence nothing arrives at the drives until it is over.
+    A lost torque is 0; a stuck torque keeps its last value. A frozen sensor repeats its last value;
+    a dead one gives NaN. During a silence nothing arrives at the drives.
 
     Attributes:
-        kind: What breaks.
-        t: When it begins [s].
-        duration_s: How long it lasts [s]; for good by default.
-        joint: The joint that it befalls, where it is a joint's; else empty.
-        extra_n: Weight added at the object's centre of mass [N], where it is the object's; else 0.
+        kind: Kind of the fault.
+        t: Start [s].
+        duration_s: Duration [s]; to the end of the run by default.
+        joint: Name of the joint, for faults of a joint; else empty.
+        extra_n: Weight added at the object's centre of mass [N], for faults of the object; else 0.
     """
 
     kind: FaultKind
@@ -73,10 +73,10 @@ class Fault:
             raise InvalidInputError("fault.extra_n", self.extra_n, valid)
 
     def active(self, t: float) -> bool:
-        """Whether it is there at a time [s]."""
+        """Return whether the fault is present at time t [s]."""
         return self.t <= t < self.t + self.duration_s
 
 
 def of_kinds(faults: Iterable[Fault], *kinds: FaultKind) -> tuple[Fault, ...]:
-    """The faults of some kinds."""
+    """Return the faults of the given kinds."""
     return tuple(fault for fault in faults if fault.kind in kinds)

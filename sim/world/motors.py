@@ -1,4 +1,4 @@
-"""What the motors make of the torques they are asked for."""
+"""Errors and faults of the motors: true torques from commanded ones."""
 
 from __future__ import annotations
 
@@ -10,10 +10,16 @@ from fulcrum.synthesis.arrays import Array
 
 
 class Motors:
-    """What the motors make of the torques they are asked for."""
+    """Errors and faults of the motors: true torques from commanded ones."""
 
     def __init__(self, world: World, limits: Array, joints: tuple[str, ...]) -> None:
-        """Takes over what is true of the l motors, their limits, and their joints' names."""
+        """Store the motors' true properties.
+
+        Args:
+            world: World with the motors' errors and faults.
+            limits: Torque limits [N·m or N], (l,).
+            joints: Names of the l joints.
+        """
         self._gain, self._offset = np.array(world.torque_gain), np.array(world.torque_offset)
         self._noise = world.torque_noise * limits
         self._noisy = world.torque_noise > 0.0
@@ -23,7 +29,12 @@ class Motors:
         self._stuck: dict[Fault, float] = {}
 
     def torques(self, t: float, tau: Array) -> Array:
-        """Torques at the joints [N·m or N], (l,), before the motors saturate, at a time [s]."""
+        """Return the joint torques [N·m or N], (l,), at time t [s] before saturation.
+
+        Args:
+            t: Time [s].
+            tau: Commanded torques [N·m or N], (l,).
+        """
         made = self._gain * tau if self._gain.size else tau.copy()
         if self._offset.size:
             made += self._offset

@@ -1,4 +1,4 @@
-"""What of a world a grid may set and a map may show, and how people write it down."""
+"""Parameters of a world for grids and maps, and their text form in commands."""
 
 from __future__ import annotations
 
@@ -16,19 +16,19 @@ from fulcrum.synthesis import InvalidInputError
 
 ParameterGrid = tuple[tuple[str, tuple[float, ...]], ...]
 
-# Rounds off what evenly spaced values have of the binary system, so that commands stay short.
+# Digits to which evenly spaced values are rounded, so that commands stay short.
 _DIGITS = 12
 
 
 @dataclass(frozen=True)
 class Parameter:
-    """One number of a world, or one for several of its numbers.
+    """A named number of a world, which may stand for several entries of a field.
 
     Attributes:
-        name: As in commands; the column of a sweep's rows is ``world.NAME``.
-        unit: For the labels of axes.
-        field: Of :class:`sim.world.world.World`.
-        entries: Which entries of the field in a scenario; None for a field that is one number.
+        name: Name in commands; the column of a sweep's rows is ``world.NAME``.
+        unit: Unit for the labels of axes.
+        field: Name of the field of :class:`sim.world.world.World`.
+        entries: Function from a scenario to the entries of the field; None for a single number.
     """
 
     name: str
@@ -37,14 +37,14 @@ class Parameter:
     entries: Callable[[Scenario], slice] | None = None
 
     def read(self, world: World, scenario: Scenario) -> float:
-        """Its value in a world: of several entries the least, which is what friction fails by."""
+        """Return the parameter's value: the smallest entry, which decides for friction."""
         value = getattr(world, self.field)
         if self.entries is None:
             return float(value)
         return float(min(value[self.entries(scenario)], default=1.0))
 
     def set(self, world: World, scenario: Scenario, value: float) -> World:
-        """The world with this value in all of its entries."""
+        """Return a copy of the world with this value in all entries of the parameter."""
         if self.entries is None:
             return _changed(world, self.field, value)
         values = np.array(getattr(world, self.field), float)
@@ -89,12 +89,12 @@ PARAMETERS = {
         Parameter("stiffness", "factor", "stiffness", _all),
     )
 }
-# Gravity is what it is: a factor on the weight is one on the mass.
+# Gravity is constant, so a factor on the weight is one on the mass.
 _ALSO = {"weight": "mass"}
 
 
 def parameter_name(field: str, text: str) -> str:
-    """The parameter that is meant.
+    """Return the name of the parameter in a text.
 
     Raises:
         InvalidInputError: There is none of that name.
@@ -106,7 +106,7 @@ def parameter_name(field: str, text: str) -> str:
 
 
 def overridden(world: World, scenario: Scenario, values: Mapping[str, float]) -> World:
-    """A drawn world with some of its parameters set.
+    """Return a copy of a drawn world with some of its parameters set.
 
     Raises:
         InvalidInputError: A value is not valid.
@@ -117,7 +117,7 @@ def overridden(world: World, scenario: Scenario, values: Mapping[str, float]) ->
 
 
 def parse_values(field: str, text: str) -> dict[str, float]:
-    """One value per parameter, from text like ``friction=0.8,mass=1.1``.
+    """Return one value per parameter, from text like ``friction=0.8,mass=1.1``.
 
     Raises:
         InvalidInputError: The text is not of that form.
@@ -130,7 +130,7 @@ def parse_values(field: str, text: str) -> dict[str, float]:
 
 
 def parse_grid(field: str, text: str) -> ParameterGrid:
-    """Values per parameter, from text like ``friction=0.7:1.3:7,mass=0.8,1.0,1.2``.
+    """Return the values per parameter, from text like ``friction=0.7:1.3:7,mass=0.8,1.0,1.2``.
 
     ``first:last:count`` stands for evenly spaced values.
 

@@ -1,4 +1,4 @@
-"""What a real cell brings, as ranges: worlds are drawn from them by seed."""
+"""Ranges of deviations and disturbances in a real cell, from which worlds are drawn by seed."""
 
 from __future__ import annotations
 
@@ -15,36 +15,39 @@ from fulcrum.synthesis import InvalidInputError
 from fulcrum.synthesis.arrays import Array
 from fulcrum.synthesis.checks import each, not_negative, whole
 
-# More pushes than this in one manoeuvre are a mistake.
+# Largest number of pushes in one manoeuvre; more are taken for a mistake.
 _MOST_PUSHES = 1000
 
 
 @dataclass(frozen=True)
 class Uncertainty:
-    """Ranges of a :class:`sim.world.world.World`; "+-" is uniform on both sides, "noise" Gaussian.
+    """Ranges of a :class:`sim.world.world.World`.
+
+    Values marked +- are half widths of uniform distributions; noises are standard deviations of
+    Gaussian ones.
 
     Attributes:
         mass: +- share of the object's mass [-].
-        center_of_mass: +- along each of the object's axes [m].
+        center_of_mass: +- shift along each of the object's axes [m].
         size: +- share of the object's size [-].
-        friction_down, friction_up: Shares by which friction may be less, or more, at each pair of
-            surfaces, independently [-].
-        hand_place: +- along both tangents of each hand's contact [m].
+        friction_down, friction_up: Largest shares by which friction is smaller or larger,
+            independently at each pair of surfaces [-].
+        hand_place: +- shift along both tangents of each hand's contact [m].
         link_mass: +- share of the mass of each driven link [-].
-        joint_friction: Dry friction of each joint, up to this share of its torque limit [-].
+        joint_friction: Largest dry friction of each joint, as a share of its torque limit [-].
         torque_gain: +- share of each motor's torque [-].
-        torque_offset: +- of each motor, as a share of its limit [-].
-        torque_noise: Of each motor, as a share of its limit [-].
-        encoder_noise: [rad or m].
-        position_noise: Of the object, per axis [m].
-        orientation_noise: Of the object, per axis [rad].
-        latency: Of the outer loop [s].
+        torque_offset: +- offset of each motor's torque, as a share of its limit [-].
+        torque_noise: Noise of each motor's torque, as a share of its limit [-].
+        encoder_noise: Noise of joint angles [rad or m].
+        position_noise: Noise of the object's position, per axis [m].
+        orientation_noise: Noise of the object's orientation, per axis [rad].
+        latency: Latency of the outer loop [s].
         dropped: Share of the outer loop's ticks that get lost [-].
-        pushes: How many pushes there are while the object is held with full grip.
+        pushes: Number of pushes while the object is held with full grip.
         push: Largest force of a push [N]; direction and place on the object are random.
         push_s: Duration of a push [s].
-        stiffness_down, stiffness_up: Shares by which each hand's contact may be softer, or stiffer,
-            log-uniformly [-].
+        stiffness_down, stiffness_up: Largest shares by which each hand's contact is softer or
+            stiffer, log-uniform [-].
     """
 
     mass: float = 0.0
@@ -126,7 +129,7 @@ PRESETS = {"nominal": NOMINAL, "lab": LAB, "field": FIELD, "harsh": HARSH}
 
 
 def preset(name: str) -> Uncertainty:
-    """A named preset.
+    """Return the ranges of a preset.
 
     Raises:
         InvalidInputError: There is none of that name.
@@ -137,7 +140,7 @@ def preset(name: str) -> Uncertainty:
 
 
 def draw(uncertainty: Uncertainty, scenario: Scenario, seed: int) -> World:
-    """The world of a seed: the same for the same arguments.
+    """Return the world of a seed; the same arguments give the same world.
 
     Raises:
         InvalidInputError: The seed is negative.
@@ -151,7 +154,7 @@ def draw(uncertainty: Uncertainty, scenario: Scenario, seed: int) -> World:
     def within(half: float, size: int) -> Array:
         return half * random.uniform(-1.0, 1.0, size)
 
-    # In the order of the fields; one added later goes last, or every world changes.
+    # Drawn in the order of the fields. A new field goes last, else all worlds change.
     mass = 1.0 + float(within(u.mass, 1)[0])
     center = within(u.center_of_mass, 3)
     size = 1.0 + float(within(u.size, 1)[0])
@@ -188,7 +191,7 @@ def draw(uncertainty: Uncertainty, scenario: Scenario, seed: int) -> World:
 
 
 def _one_per_pair(scenario: Scenario, friction: Array) -> tuple[float, ...]:
-    """Contacts of the same two surfaces share the friction of the first of them."""
+    """Return the friction factors, with that of the first contact for all of the same surfaces."""
     pairs = [(hand.name, hand.geom) for hand in scenario.hands]
     pairs += [(support.surface, support.geom) for support in scenario.supports]
     return tuple(float(friction[pairs.index(pair)]) for pair in pairs)
@@ -200,7 +203,7 @@ def _push(
     bounds: tuple[Array, Array],
     random: np.random.Generator,
 ) -> Push:
-    """At any time while the object is held, in any direction, anywhere within its bounds."""
+    """Return a push with random time in the hold, direction, and place in the object's bounds."""
     schedule = Schedule(scenario)
     held = np.flatnonzero(schedule.held)
     first, last = (schedule.starts[held[0]], schedule.ends[held[-1]]) if len(held) else (0.0, 0.0)

@@ -1,4 +1,4 @@
-"""What pushes and pulls at the object during a run: pushes, and weight that comes on top."""
+"""External forces on the object during a run: pushes and added weight."""
 
 from __future__ import annotations
 
@@ -27,6 +27,6 @@ class Pushes:
         ]
 
     def at(self, t: float) -> list[AppliedForce]:
-        """Return the forces during the step that begins at a time [s]."""
+        """Return the forces during the step that begins at time t [s]."""
         forces = [force for start, end, force in self._pushes if start <= t < end]
         return forces + [force for fault, force in self._weights if fault.active(t)]

@@ -1,4 +1,4 @@
-"""What the controller sees of the plant's state: the truth, with noise, or what is broken."""
+"""Sensors: the plant's true state with noise and faults."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from fulcrum.sim.world.faults import Fault, FaultKind, of_kinds
 from fulcrum.sim.world.world import World
 from fulcrum.synthesis.arrays import Array
 
-# Speeds come from angles through a filter of this bandwidth, which makes noise of their noise.
+# Bandwidth of the filter that derives speeds from angles; it scales the noise of speeds.
 _SPEED_FILTER = 100.0  # [rad/s]
 
 
@@ -18,14 +18,14 @@ class Sensors:
     """Encoders and the tracking of the object."""
 
     def __init__(self, world: World, joints: tuple[str, ...]) -> None:
-        """Takes over what is true, and the names of the l joints that are measured."""
+        """Store the world's noise and faults, and the names of the l measured joints."""
         self._world, self._joints = world, joints
         encoders = FaultKind.ENCODER_FROZEN, FaultKind.ENCODER_DEAD
         self._encoder_faults = of_kinds(world.faults, *encoders)
         self._pose_faults = of_kinds(world.faults, FaultKind.POSE_FROZEN, FaultKind.POSE_DEAD)
         self._frozen: dict[Fault, Array] = {}
         self._random = np.random.default_rng([world.seed, 1])
-        # Of angles, speeds, position and turn, as far as they are noisy: one draw for all of them.
+        # Noise of angles, speeds, position and orientation, if not zero: one draw for all of them.
         deviations = [
             np.full(len(joints), world.encoder_noise),
             np.full(len(joints), world.encoder_noise * _SPEED_FILTER),
@@ -36,7 +36,7 @@ class Sensors:
         self._deviations = flat[flat > 0.0]
 
     def see(self, truth: Measurement) -> Measurement:
-        """Return the measurement as the controller gets it."""
+        """Return the measurement that the controller gets for a true state."""
         seen = truth
         if self._deviations.size:
             seen = self._noisy(seen)
@@ -75,7 +75,7 @@ class Sensors:
         return seen._replace(p_WO=pose[:3], quat_WO=pose[3:])
 
     def _broken(self, fault: Fault, values: Array) -> Array:
-        """What a sensor gives instead of these values: the first that it froze at, or NaN."""
+        """Return a broken sensor's output for these values: the value when it froze, or NaN."""
         if fault.kind in (FaultKind.ENCODER_DEAD, FaultKind.POSE_DEAD):
             return np.full_like(values, np.nan)
         return self._frozen.setdefault(fault, values.copy()).copy()

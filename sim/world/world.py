@@ -1,6 +1,6 @@
-"""One world: what is true of a plant beyond the belief about it, and what disturbs it.
+"""One world: deviations of the plant from the scenario, and disturbances.
 
-Truth goes to the plant, its sensors and its wires alone; the controller keeps its belief.
+They affect only plant, sensors and transmission; the controller uses the scenario.
 """
 
 from __future__ import annotations
@@ -21,13 +21,13 @@ from fulcrum.synthesis.checks import finite, not_negative, positive, vector
 
 @dataclass(frozen=True)
 class Push:
-    """A force on the object for a while, as of somebody who bumps into it.
+    """A force on the object for a limited time, as when a person bumps into it.
 
     Attributes:
-        t: When it begins [s].
-        duration_s: [s].
-        force_W: In world axes [N].
-        p_OA_O: Where it acts, in the object frame [m].
+        t: Start [s].
+        duration_s: Duration [s].
+        force_W: Force in world axes [N].
+        p_OA_O: Point of application in the object frame [m].
     """
 
     t: float
@@ -44,32 +44,33 @@ class Push:
 
 @dataclass(frozen=True)
 class World:
-    """How the truth deviates from a scenario; the default deviates in nothing.
+    """Deviations of the truth from a scenario, and disturbances; none by default.
 
-    Empty tuples stand for no deviation at all.
+    Empty tuples mean no deviation.
 
     Attributes:
-        seed: Draws the noise and the dropped ticks.
-        mass: Of the object, as a factor [-].
-        center_of_mass: Of the object, added to the believed one, in the object frame [m].
-        size: Of the object about its pivot, as a factor [-]; its edges and faces move with it.
+        seed: Seed of noise and dropped ticks.
+        mass: Factor on the object's mass [-].
+        center_of_mass: Shift of the object's centre of mass, in the object frame [m].
+        size: Factor on the object's size about its pivot [-]; its edges and faces move with it.
         friction: Factors on the friction of each contact, hands first [-], (m,).
-        hand_place: How far along (t, o) from its place on the wrist each hand's tip really is [m],
-            (n, 2): so far from the believed contact it touches.
+        hand_place: Shift along (t, o) of each hand's tip from its nominal place on the wrist [m],
+            (n, 2). The hand touches the object as far from the nominal contact.
         link_mass: Factors on mass and inertia of the link behind each driven joint [-], (l,).
         joint_friction: Dry friction of each driven joint [N·m or N], (l,).
-        torque_gain: What each motor makes of a commanded torque [-], (l,).
-        torque_offset: What it adds [N·m or N], (l,).
+        torque_gain: Factor on each commanded torque [-], (l,).
+        torque_offset: Offset of each motor's torque [N·m or N], (l,).
         torque_noise: Standard deviation of each motor's torque at every physics step, as a share
             of its limit [-].
         encoder_noise: Standard deviation of the angles that the controller sees [rad or m].
         position_noise: Standard deviation of the object's position, per axis, at every step [m].
-        orientation_noise: Standard deviation of its turn, per axis, at every step [rad].
+        orientation_noise: Standard deviation of the object's orientation, per axis, at every step
+            [rad].
         latency: Time from measurement to effect of the outer loop [s].
         dropped: Share of the outer loop's ticks whose results get lost [-].
         pushes: Forces on the object.
-        obstacles: What stands in the world besides the environment that is believed.
-        faults: What breaks during the run.
+        obstacles: Geoms in the world that the scenario's environment does not contain.
+        faults: Faults during the run.
         stiffness: Factors on the stiffness of each hand's contact [-], (n,).
     """
 
@@ -98,7 +99,7 @@ class World:
         if self.seed < 0:
             raise InvalidInputError("world.seed", self.seed, "an integer >= 0")
         positive("world.mass", self.mass)
-        if not 1e-3 <= self.size <= 1e3:  # its square is to be a number
+        if not 1e-3 <= self.size <= 1e3:  # its square must be a finite number
             raise InvalidInputError("world.size", self.size, "in [0.001, 1000]")
         vector("world.center_of_mass", self.center_of_mass, 3)
         for name in ("friction", "link_mass", "torque_gain", "stiffness"):
@@ -119,7 +120,7 @@ class World:
         """Refuse a world that does not fit these driven joints.
 
         Raises:
-            InvalidInputError: A tuple has another length, or a fault names none of them.
+            InvalidInputError: A tuple has another length, or a fault names another joint.
         """
         for name in ("link_mass", "joint_friction", "torque_gain", "torque_offset"):
             _check_length(name, getattr(self, name), len(joints))
@@ -128,10 +129,10 @@ class World:
                 raise InvalidInputError("fault.joint", fault.joint, f"one of {', '.join(joints)}")
 
     def truth(self, scenario: Scenario) -> Scenario:
-        """The scenario as it truly is: object, contacts, and where the object lies.
+        """Return the scenario with the true object, contacts and rests.
 
         Raises:
-            InvalidInputError: A tuple has another length than the scenario asks for.
+            InvalidInputError: A tuple has another length than the scenario requires.
         """
         n, contacts = len(scenario.hands), len(scenario.contact_names)
         _check_length("friction", self.friction, contacts)
@@ -191,7 +192,7 @@ class World:
         )
 
 
-# The truth is as believed.
+# The world without deviations and disturbances.
 NO_DEVIATION = World()
 
 
@@ -205,7 +206,7 @@ def _slipperier(friction: Friction, factor: float) -> Friction:
 
 
 def _rest(rest: Rest, supports: tuple[Support, ...]) -> Rest:
-    """A place of rest with the friction of the supports on the same pair of geoms, if any."""
+    """Return a rest with the friction of the supports on the same pair of geoms, if any."""
     for support in supports:
         if (support.geom, support.surface) == (rest.geom, rest.surface):
             return replace(rest, friction=support.friction)
