@@ -1,7 +1,6 @@
-"""MJCF models that ship with fulcrum, and the official robot descriptions they come from.
+"""MJCF models that ship with fulcrum, and the official robot descriptions that they are made from.
 
-This package imports neither a simulator nor a mesh reader, so that every other package may ask it
-for a path.
+This package imports neither a simulator nor a mesh reader, so that every package can import it.
 """
 
 from __future__ import annotations
@@ -14,7 +13,7 @@ if TYPE_CHECKING:
     import mujoco
 
 DESCRIPTIONS = "example-robot-data"
-"""The wheel that holds the official descriptions; pure data, nothing in it can be imported."""
+"""The wheel with the official descriptions: pure data, without modules."""
 
 ROBOTS: dict[str, str | None] = {
     "baxter": "baxter_description/urdf/baxter.urdf",
@@ -22,7 +21,7 @@ ROBOTS: dict[str, str | None] = {
     "panda": "panda_description/urdf/panda.urdf",
     "ur5": "ur_description/urdf/ur5_robot.urdf",
 }
-"""The robots that ship, each with the description whose meshes recordings show."""
+"""The robots that ship, and the description with the meshes that recordings show."""
 HANDS = ("finger_tip", "palm_pad")
 """The hands that ship."""
 
@@ -30,13 +29,10 @@ _HERE = Path(__file__).parent
 
 
 def asset_path(name: str) -> Path:
-    """Path of a shipped MJCF file.
-
-    Args:
-        name: File name, such as `"baxter.xml"`.
+    """Return the path of a shipped MJCF file, such as `"baxter.xml"`.
 
     Raises:
-        FileNotFoundError: If there is no such file; the message lists the valid names.
+        FileNotFoundError: There is no such file; the message lists the valid names.
     """
     valid = sorted(path.name for path in _HERE.glob("*.xml"))
     if name not in valid:
@@ -45,13 +41,13 @@ def asset_path(name: str) -> Path:
 
 
 def description_path(relative: str) -> Path:
-    """Path of a file among the official descriptions of the installed wheel.
+    """Return the path of a file of the official descriptions.
 
     Args:
-        relative: Path below its folder `robots`, such as `"baxter_description/urdf/baxter.urdf"`.
+        relative: Path below the folder `robots`, such as `"baxter_description/urdf/baxter.urdf"`.
 
     Raises:
-        FileNotFoundError: If the wheel is not installed or has no such file.
+        FileNotFoundError: The wheel is not installed or has no such file.
     """
     try:
         wheel = distribution(DESCRIPTIONS)
@@ -71,13 +67,13 @@ def description_path(relative: str) -> Path:
 
 
 def velocity_limits(model: mujoco.MjModel) -> dict[str, float]:
-    """Speed limits [rad/s or m/s] by joint name.
+    """Return the speed limits [rad/s or m/s] by joint name.
 
-    MJCF knows no speed limit of a joint; the robots here carry it as the first number of the
-    joint's `user` data, which stays with the joint when the robot is attached to a scene.
+    MJCF has no speed limit of a joint. In the robots here it is the first number of the joint's
+    `user` data, which is kept when the robot is attached to a scene.
 
     Raises:
-        ValueError: If the model's joints carry no user data.
+        ValueError: The model's joints have no user data.
     """
     if model.nuser_jnt == 0:
         raise ValueError("velocity_limits: got joints without user data; valid is `user=` [rad/s].")

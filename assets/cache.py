@@ -1,4 +1,4 @@
-"""Arrays that take long to make, kept in the user's cache folder."""
+"""Cache, in the user's cache folder, of arrays that take long to make."""
 
 from __future__ import annotations
 
@@ -14,13 +14,11 @@ from numpy.typing import NDArray
 
 
 def cached(key: str, make: Callable[[], list[NDArray]]) -> list[NDArray]:
-    """Arrays by a key, which must stand for all that determines them.
-
-    A cache that cannot be read or written costs time, no more.
+    """Return the arrays of a key from the cache, or make them if the cache cannot be used.
 
     Args:
-        key: A digest; names the file.
-        make: Makes the arrays where the cache has none, or a damaged file.
+        key: Digest of everything that determines the arrays; the name of the file.
+        make: Function that makes the arrays.
     """
     kept_in = folder()
     if kept_in is None:
@@ -32,7 +30,7 @@ def cached(key: str, make: Callable[[], list[NDArray]]) -> list[NDArray]:
     arrays = make()
     with contextlib.suppress(OSError):
         path.parent.mkdir(parents=True, exist_ok=True)
-        # Complete or absent, whoever else writes it at the same time.
+        # Renaming makes the file complete or absent, even if another process writes it.
         with tempfile.NamedTemporaryFile(dir=path.parent, delete=False) as file:
             np.savez(file, *arrays)
         Path(file.name).replace(path)
@@ -44,5 +42,5 @@ def folder() -> Path | None:
     root = os.environ.get("XDG_CACHE_HOME")
     try:
         return Path(root or Path.home() / ".cache") / "fulcrum"
-    except RuntimeError:  # an unknown user, and no HOME
+    except RuntimeError:  # unknown user without HOME
         return None

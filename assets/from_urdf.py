@@ -1,4 +1,4 @@
-"""Makes the robots that ship from their official URDFs: `python -m fulcrum.assets.from_urdf`."""
+"""Conversion of the official URDFs to MJCF: `python -m fulcrum.assets.from_urdf`."""
 
 from __future__ import annotations
 
@@ -20,13 +20,13 @@ HEADER = """\
 
 @dataclass(frozen=True)
 class Recipe:
-    """What is made of an official URDF.
+    """Options for the conversion of an official URDF.
 
     Attributes:
-        title: What it is.
-        licence: Of the description.
-        without: Joints that are left out with all that hangs from them.
-        cuts: Heights [m] at which a mesh's outline jumps; each slice between them becomes one box.
+        title: Name of the robot in the header.
+        licence: Licence of the description.
+        without: Joints that are left out with all their descendants.
+        cuts: Heights [m] that cut a link's meshes into slices; each slice becomes one box.
         guards: Links whose shapes are in group 3, which viewers hide: they keep arms off the head.
     """
 
@@ -55,12 +55,12 @@ RECIPES = {
 
 
 def urdf_of(name: str) -> str:
-    """Text of the official URDF of a robot that ships, without what its recipe leaves out."""
+    """Return the official URDF of a robot that ships, without the joints its recipe leaves out."""
     return without_branches(_description(name).read_text(), RECIPES[name].without)
 
 
 def shipped_mjcf(name: str) -> str:
-    """The text of the MJCF file of a robot that ships."""
+    """Return the text of the MJCF file of a robot that ships."""
     recipe, path = RECIPES[name], _description(name)
     mjcf = mjcf_of(urdf_of(name), path, recipe.cuts)
     for guard in recipe.guards:
@@ -83,7 +83,7 @@ def _description(name: str) -> Path:
 
 
 def main() -> None:
-    """Rewrites the files."""
+    """Write the MJCF files of all recipes."""
     for name in RECIPES:
         Path(__file__).with_name(f"{name}.xml").write_text(shipped_mjcf(name))
 

@@ -1,4 +1,4 @@
-"""Mesh files of a robot, read and made light: decimated, shaded and coloured triangles."""
+"""Mesh files of a robot as light meshes: decimated, shaded and coloured triangles."""
 
 from __future__ import annotations
 
@@ -13,29 +13,29 @@ from trimesh.visual import TextureVisuals
 from fulcrum.assets.packages import ModelError
 
 FACES_PER_MESH = 7_000
-"""Triangle goal for one mesh file, missed where open borders are long; the pedestal had 74,707."""
+"""Target of triangles per mesh file; long open borders need more. The pedestal had 74,707."""
 AGGRESSION = 3.0
-"""Of the decimation, 0 to 10: at 5 the torso grows a spike of 29 mm, at 3 the worst is 1.4 mm."""
+"""Decimation setting, 0 to 10: at 5 the torso has a spike of 29 mm, at 3 the worst is 1.4 mm."""
 DARKEST = 30
-"""Colour channels are raised to this: the official black (3, 3, 3) shows no shading at all."""
+"""Least value of a colour channel: the official black (3, 3, 3) would show no shading."""
 UNPAINTED = (0.7, 0.7, 0.7, 1.0)
-"""Colour [0, 1] of what has none."""
+"""Colour [0, 1] of a part without a colour."""
 CREASE = 0.6
 """Edges sharper than this [rad] stay sharp in the shading."""
 
 
 def read_mesh(file: Path, scale: tuple[float, ...]) -> list[trimesh.Trimesh]:
-    """Parts of a mesh file, one per material, in the mesh frame [m].
+    """Return the parts of a mesh file, one per material, in the mesh frame [m].
 
-    The COLLADA unit is honoured. Its up axis is not, as in RViz: ROS meshes are in link axes
-    whatever they declare (the torso, which says Y_UP, matches its Z_UP collision mesh unrotated).
+    The COLLADA unit is used. The up axis is ignored, as in RViz: ROS meshes are in link axes
+    whatever they declare (the Y_UP torso matches its Z_UP collision mesh without rotation).
 
     Raises:
-        ModelError: The file holds no mesh that can be read.
+        ModelError: The file has no mesh that can be read.
     """
     try:
         scene = trimesh.load_scene(file)
-    except Exception as error:  # each of trimesh's readers has its own
+    except Exception as error:  # each reader of trimesh raises its own errors
         given = f"file {file.name} ({type(error).__name__}: {error})"
         raise ModelError(given, "a mesh file that trimesh reads") from None
     to_metres = trimesh.units.unit_conversion(scene.units or "meters", "meters")
@@ -50,10 +50,11 @@ def read_mesh(file: Path, scale: tuple[float, ...]) -> list[trimesh.Trimesh]:
 def light_mesh(
     file: Path, scale: tuple[float, ...], fallback: tuple[float, ...] | None
 ) -> list[NDArray]:
-    """Vertices, faces, normals and colours of a mesh file within the triangle budget."""
+    """Return vertices, faces, normals and colours of a mesh file, with about the target's faces."""
     parts = read_mesh(file, scale)
     keep = FACES_PER_MESH / sum(len(part.faces) for part in parts)
-    light = [_shaded(_decimated(part, keep)) for part in parts]
+    # Vertices are split at creases, so that vertex normals shade the part well.
+    light = [trimesh.graph.smooth_shade(_decimated(part, keep), angle=CREASE) for part in parts]
     rgba = [_part_rgba(part, fallback) for part in parts]
     sizes = [len(part.vertices) for part in light]
     starts = np.cumsum([0, *sizes[:-1]])
@@ -67,11 +68,11 @@ def light_mesh(
 
 
 def _decimated(part: trimesh.Trimesh, keep: float) -> trimesh.Trimesh:
-    """The part with its seams closed and the fraction `keep` of its faces left."""
+    """Return the part with closed seams and the fraction `keep` of its faces."""
     vertices, inverse = np.unique(np.round(part.vertices, 6), axis=0, return_inverse=True)
     faces = inverse.reshape(-1)[part.faces]
     if keep < 1.0:
-        # An open border is often the only edge of a flat sheet: without it half the pedestal goes.
+        # An open border is often the only edge of a flat sheet, as in half of the pedestal.
         vertices, faces = fast_simplification.simplify(
             vertices,
             faces.astype(np.int32),
@@ -84,13 +85,8 @@ def _decimated(part: trimesh.Trimesh, keep: float) -> trimesh.Trimesh:
     return light
 
 
-def _shaded(part: trimesh.Trimesh) -> trimesh.Trimesh:
-    """The part with its vertices split at creases, so that vertex normals shade it well."""
-    return trimesh.graph.smooth_shade(part, angle=CREASE)
-
-
 def _part_rgba(part: trimesh.Trimesh, fallback: tuple[float, ...] | None) -> NDArray[np.uint8]:
-    """The COLLADA diffuse colour; without a material the URDF's, and without that light grey."""
+    """Return the COLLADA diffuse colour, else the URDF's colour, else light grey."""
     if isinstance(part.visual, TextureVisuals):
         rgba = part.visual.material.main_color
     else:

@@ -1,7 +1,7 @@
-"""Makes of any robot's MJCF one like those that ship: motors with limits, nothing beside the robot.
+"""Conversion of any robot's MJCF to the form of those that ship: the robot alone, with motors.
 
-What is left out belongs to the scene (floor and whatever else is part of the world, lights,
-cameras, options, keyframes) or to another controller (actuators, sensors, tendons, equalities).
+Elements that belong to the scene (floor, lights, cameras, options, keyframes) or to another
+controller (actuators, sensors, tendons, equalities) are removed.
 """
 
 from __future__ import annotations
@@ -14,11 +14,11 @@ import numpy as np
 from fulcrum.assets.packages import ModelError
 
 LOOKS = 2
-"""Group of geoms that are there to be looked at only, as is the custom in MJCF."""
+"""Group of visual geoms, by the convention of MJCF."""
 SOLID = 3
-"""Group of the geoms that may touch, where others are there to be looked at."""
+"""Group of the geoms that may touch, in a robot with visual geoms."""
 _JOINT = mujoco.mjtTrn.mjTRN_JOINT
-# What a file's main defaults say of things that the scene adds to it.
+# Main defaults of a file that would apply to elements of the scene.
 _DEFAULTS = {
     "geom": "type size pos quat group margin gap condim priority friction solmix solref solimp "
     "density mass rgba",
@@ -29,15 +29,15 @@ _DEFAULTS = {
 
 
 def tidy(spec: mujoco.MjSpec) -> None:
-    """Leaves the robot alone, each of its joints with a motor.
+    """Keep only the robot, with a motor at each joint.
 
-    A motor's range is the narrowest that joint (``actuatorfrcrange``) and actuators
-    (``forcerange``, or a motor's ``ctrlrange``) state; where they state none it has none. Geoms
-    keep their shapes, and touch nothing unless they are paired. Bodies and geoms without a name
-    get one. Springs and dry friction of joints stay, though the robot model knows of neither.
+    A motor's range is the narrowest of joint (``actuatorfrcrange``) and actuators (``forcerange``,
+    or a motor's ``ctrlrange``); without any of them it has none. Geoms keep their shapes and touch
+    nothing unless paired. Bodies and geoms without a name get one. Springs and dry friction of
+    joints are kept, although the robot model has neither.
 
     Raises:
-        ModelError: MuJoCo does not compile it, or the robot model does not know one of its joints.
+        ModelError: MuJoCo does not compile it, or the robot model does not support a joint.
     """
     try:
         model = spec.compile()
@@ -80,12 +80,10 @@ def _check_joints(model: mujoco.MjModel) -> None:
 
 
 def _motors(model: mujoco.MjModel, joints: list[str]) -> dict[str, tuple[float, float]]:
-    """Least and largest torque or force of each joint, first of those with an actuator."""
-    ranges = {}
-    for i in range(model.nu):
-        if _drives_a_joint(model, i):
-            ranges[model.joint(model.actuator_trnid[i, 0]).name] = (-np.inf, np.inf)
-    ranges |= {name: (-np.inf, np.inf) for name in joints if name not in ranges}
+    """Return least and largest torque or force by joint, joints with an actuator first."""
+    driven = [i for i in range(model.nu) if _drives_a_joint(model, i)]
+    driven_joints = [model.joint(model.actuator_trnid[i, 0]).name for i in driven]
+    ranges = dict.fromkeys([*driven_joints, *joints], (-np.inf, np.inf))
     for name, (low, high) in _limits(model):
         if name in ranges:
             ranges[name] = (max(ranges[name][0], low), min(ranges[name][1], high))
@@ -93,7 +91,7 @@ def _motors(model: mujoco.MjModel, joints: list[str]) -> dict[str, tuple[float, 
 
 
 def _limits(model: mujoco.MjModel) -> Iterator[tuple[str, tuple[float, float]]]:
-    """All limits of torques or forces that a model states, by the names of their joints."""
+    """Yield all limits of torques or forces in a model, each with the name of its joint."""
     for j in range(model.njnt):
         if model.jnt_actfrclimited[j]:
             yield model.joint(j).name, tuple(model.jnt_actfrcrange[j].tolist())
@@ -124,20 +122,20 @@ def _in_order(limits: np.ndarray) -> tuple[float, float]:
 
 
 def _looks(model: mujoco.MjModel) -> list[bool]:
-    """Which geoms are there to be looked at only: those that touch nothing, if others do."""
+    """Return which geoms are visual: those that touch nothing, if others touch."""
     touches = (model.geom_contype | model.geom_conaffinity) != 0
     return (~touches).tolist() if touches.any() else [False] * model.ngeom
 
 
 def _beside(spec: mujoco.MjSpec) -> Iterator[Iterable]:
-    """What of a file is not the robot; what refers to other elements before those."""
+    """Yield the elements outside the robot, those that refer to others first."""
     yield from (spec.keys, spec.sensors, spec.actuators, spec.equalities, spec.tendons)
     yield from (spec.pairs, spec.excludes, spec.tuples, spec.skins, spec.flexes)
     yield from (spec.cameras, spec.lights, spec.texts, spec.numerics)
 
 
 def _name(spec: mujoco.MjSpec) -> None:
-    """Names what has no name, so that pairs and messages can refer to it."""
+    """Name bodies and geoms without a name, so that pairs and messages can refer to them."""
     bodies = {body.name for body in spec.bodies}
     for body in spec.bodies[1:]:
         body.name = body.name or _unused(f"{body.parent.name}_part", bodies)
@@ -148,7 +146,7 @@ def _name(spec: mujoco.MjSpec) -> None:
 
 
 def _unused(name: str, used: set[str]) -> str:
-    """The name, or with the first number behind it that makes it a new one; counts as used."""
+    """Return the name, with a number if it is used, and mark it as used."""
     names = (name, *(f"{name}_{i}" for i in range(1, len(used) + 1)))
     new = next(n for n in names if n not in used)
     used.add(new)
@@ -156,7 +154,7 @@ def _unused(name: str, used: set[str]) -> str:
 
 
 def _forget_defaults(spec: mujoco.MjSpec) -> None:
-    """The scene joins a robot without a prefix, and shall not inherit from its main defaults."""
+    """Reset main defaults and options, which the scene would inherit from the robot."""
     stock = mujoco.MjSpec()
     for kind, names in _DEFAULTS.items():
         ours, theirs = getattr(spec.default, kind), getattr(stock.default, kind)

@@ -1,4 +1,4 @@
-"""Robots and hands by the name of one that ships, or from any URDF or MJCF file."""
+"""Robots and hands, by the name of one that ships or from any URDF or MJCF file."""
 
 from __future__ import annotations
 
@@ -17,18 +17,18 @@ from fulcrum.assets.cache import cached
 from fulcrum.assets.mjcf import tidy
 from fulcrum.assets.packages import ModelError, check_files, named_file, read_xml
 
-# What turns a URDF into MJCF: with another version of any of them the cache does not count.
+# Packages that convert URDF to MJCF: another version of one invalidates the cache.
 _CONVERTERS = ("mujoco", "numpy", "pycollada", "trimesh")
 
 
 def robot_spec(model: str) -> mujoco.MjSpec:
-    """A robot alone, with a motor at each joint; see `fulcrum.assets.mjcf.tidy`.
+    """Return a robot with a motor at each joint; see `fulcrum.assets.mjcf.tidy`.
 
     Args:
         model: Name of a robot that ships, or path of a URDF or MJCF file.
 
     Raises:
-        ModelError: There is none, or it cannot be taken; says why.
+        ModelError: There is no such robot, or its file is not valid; says why.
     """
     path = _path(model, tuple(ROBOTS))
     spec = _urdf(path) if is_urdf(path) else _mjcf(path)
@@ -37,19 +37,19 @@ def robot_spec(model: str) -> mujoco.MjSpec:
 
 
 def hand_spec(model: str) -> mujoco.MjSpec:
-    """A hand, as its file has it.
+    """Return a hand.
 
     Args:
         model: Name of a hand that ships, or path of an MJCF file.
 
     Raises:
-        ModelError: There is none, or MuJoCo does not read it.
+        ModelError: There is no such hand, or MuJoCo cannot read its file.
     """
     return _mjcf(_path(model, HANDS))
 
 
 def looks_of(model: str) -> Path | None:
-    """The URDF whose meshes show what a robot looks like; None where there is none.
+    """Return the URDF with the visual meshes of a robot; None if there is none.
 
     Raises:
         ModelError: There is no such robot.
@@ -62,10 +62,10 @@ def looks_of(model: str) -> Path | None:
 
 
 def is_urdf(path: Path) -> bool:
-    """Whether a robot's file is a URDF, rather than MJCF.
+    """Return whether a robot's file is a URDF, not MJCF.
 
     Raises:
-        ModelError: It is neither.
+        ModelError: The file is neither.
     """
     tag = read_xml(path).tag
     if tag not in ("robot", "mujoco"):
@@ -90,7 +90,7 @@ def _mjcf(path: Path) -> mujoco.MjSpec:
 
 
 def _urdf(path: Path) -> mujoco.MjSpec:
-    """The URDF in MJCF; from the cache, if neither it nor its meshes have changed."""
+    """Return the URDF as MJCF, from the cache if neither it nor its meshes have changed."""
     urdf = path.read_text()
     converters = [Path(__file__).with_name(name) for name in ("urdf.py", "meshes.py")]
     versions = [version(name) for name in _CONVERTERS]
@@ -104,7 +104,7 @@ def _urdf(path: Path) -> mujoco.MjSpec:
             return [np.frombuffer(text(mjcf_of(urdf, path)).encode(), np.uint8)]
         except ModelError:
             raise
-        except (ValueError, LookupError) as error:  # an attribute is missing, or no number
+        except (ValueError, LookupError) as error:  # an attribute is missing or not a number
             given = f"{path.name} ({type(error).__name__}: {error})"
             raise ModelError(given, "a URDF with all its names and numbers") from None
 
@@ -113,7 +113,7 @@ def _urdf(path: Path) -> mujoco.MjSpec:
 
 
 def _meshes(urdf: Path) -> Iterator[bytes]:
-    """Contents of all mesh files that a URDF names, as far as it may name them."""
+    """Yield the contents of all mesh files that a URDF names and may use."""
     for mesh in read_xml(urdf).iter("mesh"):
         with contextlib.suppress(ModelError):
             yield named_file(mesh.get("filename", ""), urdf).read_bytes()

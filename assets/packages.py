@@ -1,4 +1,4 @@
-"""Where the files are that a robot's description names, and which of them it may name."""
+"""Paths of the files that a robot's description names, which must be in its package."""
 
 from __future__ import annotations
 
@@ -7,16 +7,16 @@ from collections.abc import Iterator
 from pathlib import Path
 
 MANIFEST = "package.xml"
-"""Marks the root folder of a ROS package, and has its name."""
+"""File in the root folder of a ROS package, with the package's name."""
 DESCRIPTION_FOLDERS = ("urdf", "robots", "mjcf")
-"""Folders of a package that hold descriptions; without a manifest their parent is the package."""
+"""Folders of a package with descriptions; without a manifest their parent is the package."""
 _PACKAGE, _FILE = "package://", "file://"
-# Attributes of MJCF elements that name files, and folders in which they may be.
+# Attributes of an MJCF compiler that name folders with files.
 _FOLDERS = ("assetdir", "meshdir", "texturedir")
 
 
 class ModelError(ValueError):
-    """A model of a robot or hand that cannot be taken; says what is wrong and what is valid."""
+    """A model of a robot or hand is not valid."""
 
     def __init__(self, given: str, valid: str) -> None:
         self.given, self.valid = " ".join(given.split()), valid
@@ -24,7 +24,7 @@ class ModelError(ValueError):
 
 
 def package_root(description: Path) -> Path:
-    """The folder of the package that a description belongs to; it may name files in it only."""
+    """Return the folder of a description's package, outside of which it may not name files."""
     folder = description.resolve().parent
     for candidate in (folder, *folder.parents):
         if (candidate / MANIFEST).is_file():
@@ -33,10 +33,10 @@ def package_root(description: Path) -> Path:
 
 
 def named_file(uri: str, description: Path) -> Path:
-    """Path of a file that a URDF names: ``package://``, or relative to the URDF.
+    """Return the path of a file that a URDF names: ``package://``, or relative to the URDF.
 
     Raises:
-        ModelError: It names another package, a file outside of its own, or one that is missing.
+        ModelError: The file is missing, outside of the URDF's package or in another package.
     """
     root = package_root(description)
     if uri.startswith(_PACKAGE):
@@ -47,14 +47,19 @@ def named_file(uri: str, description: Path) -> Path:
         path = root / relative
     else:
         path = description.parent / uri.removeprefix(_FILE)
-    return _checked(path, root, uri)
+    path = path.resolve()
+    if not path.is_relative_to(root):
+        raise _outside(uri, root)
+    if not path.is_file():
+        raise ModelError(f"file {uri}, which is missing", f"a file below {root.name}")
+    return path
 
 
 def check_files(mjcf: Path) -> None:
-    """Refuses an MJCF file that names files outside its package, itself or in what it includes.
+    """Check that an MJCF file and those that it includes name only files in its package.
 
     Raises:
-        ModelError: It does, or is no XML.
+        ModelError: A file is outside the package, or is not XML.
     """
     root = package_root(mjcf)
     files, seen = [mjcf.resolve()], set()
@@ -71,10 +76,10 @@ def check_files(mjcf: Path) -> None:
 
 
 def read_xml(file: Path) -> ET.Element:
-    """The root element of an XML file.
+    """Return the root element of an XML file.
 
     Raises:
-        ModelError: It cannot be read, or is no XML.
+        ModelError: The file cannot be read, or is not XML.
     """
     try:
         return ET.fromstring(file.read_bytes())
@@ -83,19 +88,10 @@ def read_xml(file: Path) -> ET.Element:
 
 
 def _names(root: Path) -> tuple[str, ...]:
-    """What a package is called: as its folder, and as its manifest says."""
+    """Return the names of a package: that of its folder, and that in its manifest."""
     manifest = root / MANIFEST
     stated = read_xml(manifest).findtext("name", "").strip() if manifest.is_file() else ""
     return tuple(dict.fromkeys(name for name in (root.name, stated) if name))
-
-
-def _checked(path: Path, root: Path, uri: str) -> Path:
-    path = path.resolve()
-    if not path.is_relative_to(root):
-        raise _outside(uri, root)
-    if not path.is_file():
-        raise ModelError(f"file {uri}, which is missing", f"a file below {root.name}")
-    return path
 
 
 def _outside(name: str, root: Path) -> ModelError:
@@ -103,7 +99,7 @@ def _outside(name: str, root: Path) -> ModelError:
 
 
 def _named(mjcf: ET.Element) -> Iterator[tuple[str, str, set[str]]]:
-    """Tag and name of each file that an MJCF names, and the folders in which it may be."""
+    """Yield tag and name of each file that an MJCF names, and the folders in which it may be."""
     stated = {compiler.get(key, "") for compiler in mjcf.iter("compiler") for key in _FOLDERS}
     for element in mjcf.iter():
         for key, value in element.attrib.items():

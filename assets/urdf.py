@@ -1,7 +1,7 @@
-"""Turns a robot's URDF into MJCF.
+"""Conversion of a robot's URDF to MJCF.
 
-MuJoCo's own URDF reader gives the kinematics and the inertias; the shapes are the URDF's collision
-primitives, with boxes in place of meshes; names, colours, motors and speed limits are added, and
+MuJoCo's URDF reader provides kinematics and inertias. The shapes are the URDF's collision
+primitives, with boxes instead of meshes. Names, colours, motors and speed limits are added, and
 every number is written with all its digits (`MjSpec.to_xml` keeps only six).
 """
 
@@ -24,9 +24,9 @@ from fulcrum.assets.packages import ModelError, named_file
 from fulcrum.assets.visuals import named_colors, pose_of, rgba_of, scale_of
 
 PLACEHOLDER = 0.001
-"""Spheres of this radius [m] stand in URDFs where a link has no real collision shape."""
+"""Radius [m] of the sphere in a URDF for a link without a real collision shape."""
 JOINTS = ("revolute", "continuous", "prismatic", "fixed")
-"""Types of joints that the robot model knows."""
+"""Types of joints that the robot model supports."""
 DEFAULT = """
 <default>
   <default class="{name}">
@@ -38,21 +38,21 @@ Cuts = Mapping[str, tuple[float, ...]]
 
 
 def mjcf_of(urdf: str, description: Path, cuts: Cuts | None = None) -> ET.Element:
-    """A robot in MJCF.
+    """Return a robot as MJCF.
 
     Masses, centres of mass, inertias, joint frames, ranges, damping and torque limits are those of
-    the URDF; links keep their names and are not fused. Geoms have no mass and touch nothing:
-    contact comes from the explicit `<pair>` elements of a scene. A joint's `user` number is its
-    speed limit; limits that the URDF does not state, or states as 0, are left out.
+    the URDF; links keep their names and are not fused. Geoms have no mass and touch nothing unless
+    a scene has `<pair>` elements for them. A joint's `user` number is its speed limit. Limits that
+    are missing or 0 in the URDF are left out.
 
     Args:
         urdf: Text of the URDF.
-        description: Its file, from which the mesh files are found.
+        description: Path of the URDF, relative to which mesh files are found.
         cuts: Heights [m], by link, that cut its meshes into slices with a box each.
 
     Raises:
-        ModelError: MuJoCo does not read it, a joint is none that the robot model knows, or a mesh
-            is missing or lies outside the URDF's package.
+        ModelError: MuJoCo cannot read it, the robot model does not support a joint, or a mesh is
+            missing or outside the URDF's package.
     """
     robot = _checked(urdf)
     shapes = copy.deepcopy(robot)
@@ -74,19 +74,18 @@ def mjcf_of(urdf: str, description: Path, cuts: Cuts | None = None) -> ET.Elemen
 
 
 def text(mjcf: ET.Element) -> str:
-    """MJCF as indented text."""
+    """Return MJCF as indented text."""
     ET.indent(mjcf)
     return ET.tostring(mjcf, encoding="unicode") + "\n"
 
 
 def without_branches(urdf: str, joints: tuple[str, ...]) -> str:
-    """The URDF without the given joints and all links and joints that hang from them.
+    """Return the URDF without the given joints and all their descendants.
 
-    Notes for Gazebo and ROS transmissions go too, since they may name what is removed; all other
-    elements stay as they are.
+    Elements for Gazebo and ROS transmissions are removed, too, since they may name removed links.
 
     Raises:
-        ValueError: If a joint is missing; the message lists the valid ones.
+        ValueError: A joint is missing; the message lists the valid joints.
     """
     robot = ET.fromstring(urdf)
     links = {joint.attrib["name"]: _ends(joint) for joint in robot.findall("joint")}
@@ -105,7 +104,7 @@ def without_branches(urdf: str, joints: tuple[str, ...]) -> str:
 
 
 def _checked(urdf: str) -> ET.Element:
-    """The robot, with nothing but its links, joints and materials."""
+    """Return the robot with only its links, joints and materials."""
     robot = ET.fromstring(urdf)
     for element in list(robot):
         if str(element.tag).startswith(("xacro:", "{http://www.ros.org/wiki/xacro}")):
@@ -117,14 +116,14 @@ def _checked(urdf: str) -> ET.Element:
         if kind not in JOINTS:
             given = f"joint {joint.get('name')} of type {kind}"
             raise ModelError(given, f"one of type {', '.join(JOINTS)}")
-        # A joint that follows another in the robot's controller is a joint like any other here.
+        # A joint that follows another in the robot's controller is an independent joint here.
         for mimic in joint.findall("mimic"):
             joint.remove(mimic)
     return robot
 
 
 def _use_primitives(robot: ET.Element, description: Path, cuts: Cuts) -> None:
-    """Leaves each link only primitive collision shapes: its own, else its visual's, else boxes."""
+    """Keep only primitive collision shapes of each link: its own, else its visual's, else boxes."""
     for link in robot.findall("link"):
         visuals, collisions = link.findall("visual"), link.findall("collision")
         shapes = [shape for shape in collisions if not _is_placeholder(shape)] or visuals
@@ -143,7 +142,7 @@ def _is_placeholder(shape: ET.Element) -> bool:
 
 
 def _boxes(shape: ET.Element, description: Path, cuts: tuple[float, ...]) -> list[ET.Element]:
-    """Boxes along the link's axes around the slices of a mesh, rounded to 0.1 mm."""
+    """Return boxes along the link's axes around the slices of a mesh, rounded to 0.1 mm."""
     mesh = shape.find("geometry/mesh")
     assert mesh is not None
     file = named_file(mesh.get("filename", ""), description)
@@ -163,7 +162,7 @@ def _boxes(shape: ET.Element, description: Path, cuts: tuple[float, ...]) -> lis
 
 
 def _slice(part: trimesh.Trimesh, low: float, high: float) -> NDArray[np.float64]:
-    """(n, 3) vertices of the part of a mesh between two heights [m]."""
+    """Return the vertices of a mesh between two heights [m], (n, 3)."""
     vertices, faces = part.vertices, part.faces
     for height, up in ((low, 1.0), (high, -1.0)):
         if np.isfinite(height):
@@ -172,7 +171,7 @@ def _slice(part: trimesh.Trimesh, low: float, high: float) -> NDArray[np.float64
 
 
 def _link_colors(robot: ET.Element) -> dict[str, tuple[float, ...]]:
-    """The URDF's colour of each link; a link without one has its parent's."""
+    """Return the URDF's colour of each link, or else that of its parent."""
     named = named_colors(robot)
     colors = {link.attrib["name"]: rgba_of(link, named) for link in robot.findall("link")}
     parents = {child: parent for parent, child in map(_ends, robot.findall("joint"))}
@@ -184,7 +183,7 @@ def _link_colors(robot: ET.Element) -> dict[str, tuple[float, ...]]:
 
 
 def _dress(mjcf: ET.Element, robot: ET.Element) -> None:
-    """Adds what the URDF reader leaves out: default class, colours, speed limits and motors."""
+    """Add default class, colours, speed limits and motors, which the URDF reader leaves out."""
     worldbody = mjcf.find("worldbody")
     assert worldbody is not None
     name = re.sub(r"\W", "_", robot.get("name", "robot"))
@@ -209,7 +208,7 @@ def _dress(mjcf: ET.Element, robot: ET.Element) -> None:
 
 
 def _write_all_digits(mjcf: ET.Element, spec: mujoco.MjSpec) -> None:
-    """Puts the numbers of the spec in place of the rounded ones, inertias as the URDF has them."""
+    """Replace rounded numbers by those of the spec, and inertias by those of the URDF."""
     for tag, find in (("body", spec.body), ("joint", spec.joint), ("geom", spec.geom)):
         for element in mjcf.findall(f"./worldbody//{tag}"):
             source = find(element.attrib["name"])
@@ -222,18 +221,18 @@ def _write_all_digits(mjcf: ET.Element, spec: mujoco.MjSpec) -> None:
             inertial.attrib.clear()
             inertial.set("pos", _digits(source.ipos))
             inertial.set("mass", _digits([source.mass]))
-            full = np.isfinite(source.fullinertia).all()  # a diagonal that is all zero is not
+            full = np.isfinite(source.fullinertia).all()  # it is NaN for a zero diagonal
             key, moments = ("full", source.fullinertia) if full else ("diag", source.inertia)
             inertial.set(f"{key}inertia", _digits(moments))
 
 
 def _digits(values: Iterable[float]) -> str:
-    """Shortest text that reads back as the same numbers."""
+    """Return the shortest text that reads back as the same numbers."""
     return " ".join(repr(float(value) + 0.0).removesuffix(".0") for value in values)
 
 
 def _ends(joint: ET.Element) -> tuple[str, str]:
-    """Names of the parent and the child link of a joint."""
+    """Return the names of the parent and the child link of a joint."""
     parent, child = joint.find("parent"), joint.find("child")
     if parent is None or child is None:
         raise ModelError(f"joint {joint.get('name')}", "one with a parent and a child")

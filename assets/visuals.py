@@ -1,4 +1,4 @@
-"""The look of a robot for the recorder: one light, coloured triangle mesh per link."""
+"""Visual meshes of a robot for the recorder: light, coloured triangle meshes of the links."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from scipy.spatial.transform import Rotation
 from fulcrum.assets.cache import cached
 from fulcrum.assets.packages import named_file
 
-# What turns a mesh file into arrays: with another version of any of them the cache does not count.
+# Packages that read mesh files: another version of one invalidates the cache.
 _MESH_READERS = ("fast-simplification", "pycollada", "trimesh")
 
 
@@ -26,12 +26,12 @@ class Visual:
     """The visual mesh of one link.
 
     Attributes:
-        link: Name of the link, which is also the name of its body in MJCF.
-        X_LM: (4, 4) pose of the mesh in the link [m].
-        vertices: (n, 3) float32, in the mesh frame [m].
-        faces: (m, 3) uint32 indices of vertices, counter-clockwise seen from outside.
-        normals: (n, 3) float32 unit vectors.
-        colors: (n, 4) uint8 sRGB and opacity.
+        link: Name of the link, and of its body in MJCF.
+        X_LM: Pose of the mesh in the link [m], (4, 4).
+        vertices: Vertices in the mesh frame [m], (n, 3).
+        faces: Indices of vertices, counter-clockwise seen from outside, (m, 3).
+        normals: Unit vectors at the vertices, (n, 3).
+        colors: sRGB and opacity of the vertices, (n, 4).
     """
 
     link: str
@@ -45,15 +45,15 @@ class Visual:
 def load_visuals(
     urdf: str, description: Path, links: Collection[str] | None = None
 ) -> list[Visual]:
-    """Visual meshes of all links that have one, in the order of the URDF.
+    """Return the visual meshes of all links that have one, in the order of the URDF.
 
     Args:
         urdf: Text of the URDF, such as `fulcrum.assets.from_urdf.urdf_of("baxter")` returns.
-        description: Its file, from which the mesh files are found.
-        links: Names of the links that are wanted; None for all.
+        description: Path of the URDF, relative to which mesh files are found.
+        links: Names of the links to read; None for all.
 
     Raises:
-        ModelError: If a mesh is missing or lies outside the URDF's package.
+        ModelError: A mesh is missing or outside the URDF's package.
     """
     visuals = []
     robot = ET.fromstring(urdf)
@@ -72,24 +72,22 @@ def load_visuals(
 
 
 def link_names(urdf: str) -> list[str]:
-    """Names of all links of a URDF."""
+    """Return the names of all links of a URDF."""
     return [link.attrib["name"] for link in ET.fromstring(urdf).findall("link")]
 
 
 def pose_of(element: ET.Element) -> NDArray[np.float64]:
-    """(4, 4) pose [m] in its `<origin>`: fixed-axis roll, pitch, yaw; identity without one."""
-    origin = element.find("origin")
-    if origin is None:
-        return np.eye(4)
-    roll, pitch, yaw = _numbers(origin.get("rpy", "0 0 0"))
-    pose = np.eye(4)
-    pose[:3, :3] = Rotation.from_euler("xyz", (roll, pitch, yaw)).as_matrix()
-    pose[:3, 3] = _numbers(origin.get("xyz", "0 0 0"))
+    """Return the pose in an `<origin>` [m], (4, 4), from fixed-axis roll, pitch and yaw."""
+    pose, origin = np.eye(4), element.find("origin")
+    if origin is not None:
+        rpy = _numbers(origin.get("rpy", "0 0 0"))
+        pose[:3, :3] = Rotation.from_euler("xyz", rpy).as_matrix()
+        pose[:3, 3] = _numbers(origin.get("xyz", "0 0 0"))
     return pose
 
 
 def named_colors(robot: ET.Element) -> dict[str, tuple[float, ...]]:
-    """Colours in [0, 1] of the materials that a URDF has for all its links, by name."""
+    """Return the colours in [0, 1] of the shared materials of a URDF, by name."""
     materials = {material.get("name", ""): material for material in robot.findall("material")}
     colors = ((name, material.find("color")) for name, material in materials.items())
     return {name: tuple(_numbers(c.attrib["rgba"])) for name, c in colors if c is not None}
@@ -98,11 +96,11 @@ def named_colors(robot: ET.Element) -> dict[str, tuple[float, ...]]:
 def rgba_of(
     element: ET.Element, named: Mapping[str, tuple[float, ...]]
 ) -> tuple[float, ...] | None:
-    """Colour in [0, 1] of the `<material>` below a link or visual; None if there is none.
+    """Return the colour in [0, 1] of the `<material>` of a link or visual; None without one.
 
     Args:
         element: The link or visual.
-        named: Colours of the materials that go by their name alone.
+        named: Colours of the shared materials by name.
     """
     for material in element.iter("material"):
         color = material.find("color")
@@ -114,7 +112,7 @@ def rgba_of(
 
 
 def scale_of(mesh: ET.Element) -> tuple[float, ...]:
-    """The three scale factors of a URDF `<mesh>`."""
+    """Return the three scale factors of a URDF `<mesh>`."""
     return tuple(_numbers(mesh.get("scale", "1 1 1")))
 
 
@@ -122,7 +120,7 @@ def scale_of(mesh: ET.Element) -> tuple[float, ...]:
 def _light_mesh(
     file: Path, scale: tuple[float, ...], fallback: tuple[float, ...] | None
 ) -> list[NDArray]:
-    """Vertices, faces, normals and colours of a mesh file; from the cache, if it has them."""
+    """Return vertices, faces, normals and colours of a mesh file, from the cache if possible."""
     determined_by = [
         file.read_bytes(),
         Path(__file__).with_name("meshes.py").read_bytes(),

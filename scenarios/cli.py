@@ -58,7 +58,7 @@ AnyCommand: Any = reduce(
 )
 
 
-class Command(Protocol):
+class Executable(Protocol):
     """A command with its options."""
 
     def execute(self) -> int:
@@ -71,7 +71,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     0 pass, 1 failed its checks, 2 bad input, 70 a bug, 130 interrupted.
     """
     arguments = sys.argv[1:] if arguments is None else arguments
-    command: Command | None = None
+    command: Executable | None = None
     try:
         if list(arguments) == ["--version"]:
             print(_versions())
@@ -91,12 +91,12 @@ def main(arguments: Sequence[str] | None = None) -> int:
         return BAD_INPUT
 
 
-def _parse(arguments: Sequence[str]) -> Command:
+def _parse(arguments: Sequence[str]) -> Executable:
     """Return the command asked for, or print the help; a parse error is raised as one line."""
     errors = io.StringIO()
     try:
         with contextlib.redirect_stderr(errors):
-            command: Command = tyro.cli(
+            command: Executable = tyro.cli(
                 AnyCommand,
                 prog="fulcrum",
                 description=_DESCRIPTION,

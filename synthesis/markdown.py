@@ -1,4 +1,4 @@
-"""Markdown that notebooks and recordings show: tables, and names that cannot break them."""
+"""Markdown for notebooks and recordings: tables, numbers and escaped text."""
 
 from __future__ import annotations
 
@@ -6,21 +6,21 @@ import math
 import re
 from collections.abc import Iterable, Sequence
 
-# What Markdown or the formulas of a notebook would read as more than itself; an underscore inside a
-# word is none of it.
+# Characters with a meaning in Markdown or in a notebook's formulas; an underscore inside a word has
+# none.
 _SPECIAL = re.compile(r"[\\`*\[\]|~$#]|(?<![^\W_])_|_(?![^\W_])")
 _ENTITIES = {"&": "&amp;", "<": "&lt;", ">": "&gt;"}
 
 
 def escaped(text: object) -> str:
-    """The text on one line, so that Markdown shows each of its characters, also in a table."""
+    """Return text on one line, escaped so that Markdown shows each character, also in a table."""
     line = " ".join(str(text).split())
     line = _SPECIAL.sub(r"\\\g<0>", line)
     return re.sub("[&<>]", lambda found: _ENTITIES[found.group()], line)
 
 
 def number(value: float, digits: int = 4) -> str:
-    """A number with so many digits that count; empty for what is not there (NaN), as ∞ if so."""
+    """Return a number with a count of significant digits; "" for NaN, "∞" for infinity."""
     if math.isnan(value):
         return ""
     if math.isinf(value):
@@ -29,16 +29,16 @@ def number(value: float, digits: int = 4) -> str:
 
 
 def numbers(values: Iterable[float], digits: int = 4) -> str:
-    """Several such numbers with commas between."""
+    """Return several numbers, separated by commas; see :func:`number`."""
     return ", ".join(number(value, digits) for value in values)
 
 
 def table(head: Sequence[str], rows: Iterable[Sequence[object]]) -> list[str]:
-    """The lines of a table; empty without rows.
+    """Return the lines of a table; none without rows.
 
     Args:
-        head: Titles of the columns with their units; Markdown.
-        rows: What the cells show, as plain text.
+        head: Titles of the columns with their units, as Markdown.
+        rows: Cells as plain text.
     """
     body = [f"| {' | '.join(escaped(cell) for cell in row)} |" for row in rows]
     if not body:
@@ -47,6 +47,6 @@ def table(head: Sequence[str], rows: Iterable[Sequence[object]]) -> list[str]:
 
 
 def page(*parts: str | Sequence[str]) -> str:
-    """Paragraphs and tables with an empty line between; parts without text are left out."""
+    """Return paragraphs and tables, separated by empty lines; empty parts are left out."""
     blocks = [part if isinstance(part, str) else "\n".join(part) for part in parts]
     return "\n\n".join(block for block in blocks if block)

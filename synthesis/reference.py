@@ -1,10 +1,10 @@
-r"""An independent reference: (17) written in CVXPY, in physical variables, as the paper writes it.
+r"""An independent reference: (17) in CVXPY, in physical variables, as in the paper.
 
-It shares no code with :mod:`synthesis.conic` and :mod:`synthesis.synthesizer`. Their grasp maps,
-scaled variables and eliminated torques are here moment equations about the first contact, newtons
-and newton metres, and torques held to (15) by equality; the friction margin is bisected (its
-infimum, even where that is not attained). It is slow and meant for tests: the package does not
-import it. Nothing is normalised, so that it is accurate for loads of 1 to 1000 N, not beyond.
+It shares no code with :mod:`synthesis.conic` and :mod:`synthesis.synthesizer`. Instead of their
+grasp maps, scaled variables and eliminated torques it has moment equations about the first contact,
+newtons and newton metres, and torques tied to (15) by equality. The friction margin is bisected
+(its infimum, even if that is not attained). The reference is slow and meant for tests. Nothing is
+normalised, so it is accurate for loads of 1 to 1000 N only.
 """
 
 from __future__ import annotations
@@ -17,21 +17,27 @@ import cvxpy as cp
 import numpy as np
 
 from fulcrum.synthesis.arrays import Array
-from fulcrum.synthesis.contact import ContactModel, Role
+from fulcrum.synthesis.contact import ContactModel
 from fulcrum.synthesis.errors import FulcrumError, SolverError, UnboundedError
 from fulcrum.synthesis.problem import Objective, Problem
 
-# The first that physical variables can be solved to counts; the loosest is a hundredth of the
-# deviation that the tests allow.
+# The tightest tolerance that can be reached in physical variables is used; the loosest is a
+# hundredth of the deviation that the tests allow.
 _TOLERANCES = (1e-10, 1e-9, 1e-8)
-# An excess of friction that is none, relative to the load.
+# Excess of friction that counts as zero, relative to the load.
 _EXCESS = 1e-9
-# The last interval of the bisection: 1e-7 of the smallest margins that the tests compare.
+# Last interval of the bisection: 1e-7 of the smallest margins that the tests compare.
 _MARGIN_TOLERANCE = 1e-9
+# Positions of the variables of a contact in (f_t, f_o, f_n, m_t, m_o, m_n).
+_ROWS = {
+    ContactModel.FRICTIONLESS: [2],
+    ContactModel.PCWF: [0, 1, 2],
+    ContactModel.SFCE: [0, 1, 2, 5],
+}
 
 
 class ReferenceInfeasibleError(FulcrumError):
-    """The reference found (17) infeasible; CVXPY hands over no certificate."""
+    """The reference found (17) infeasible; CVXPY returns no certificate."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -42,7 +48,7 @@ class ReferenceSolution:
         value: Optimal objective [N, N·m or -].
         w_OC_C: Wrenches on the object in contact axes [N, N·m], (m, 6).
         tau: Joint torques [N·m or N], (l,); empty without joints.
-        variables: Scalar variables of the paper's formulation, without auxiliary ones.
+        variables: Number of scalar variables in the paper's formulation, without auxiliary ones.
     """
 
     value: float
@@ -52,12 +58,12 @@ class ReferenceSolution:
 
 
 def solve_reference(problem: Problem) -> ReferenceSolution:
-    """Solves (17) through CVXPY; accepts no status but ``optimal``.
+    """Return the solution of (17) through CVXPY, with the status ``optimal``.
 
     Raises:
         ReferenceInfeasibleError: No forces satisfy the constraints.
         UnboundedError: The objective improves without limit.
-        SolverError: The solver gave neither.
+        SolverError: The solver found neither.
     """
     return _Formulation(problem).solve()
 
@@ -67,7 +73,7 @@ class _Formulation:
 
     def __init__(self, problem: Problem) -> None:
         self.problem = problem
-        self.w = [cp.Variable(_components(c.model), name=c.name) for c in problem.contacts]
+        self.w = [cp.Variable(len(_ROWS[c.model]), name=c.name) for c in problem.contacts]
         joints = 0 if problem.joints is None else len(problem.joints.names)
         self.tau = cp.Variable(joints) if joints else None
         self.scalars = sum(w.size for w in self.w) + joints
@@ -78,14 +84,17 @@ class _Formulation:
         else:
             value = self.run(cp.Problem(cp.Minimize(self.objective()), self.constraints()))
         tau = np.zeros(0) if self.tau is None else self.tau.value
-        return ReferenceSolution(value, self._wrenches(), tau, self.scalars)
+        w_OC_C = np.zeros((len(self.w), 6))
+        for row, contact, w in zip(w_OC_C, self.problem.contacts, self.w, strict=True):
+            row[_ROWS[contact.model]] = w.value
+        return ReferenceSolution(value, w_OC_C, tau, self.scalars)
 
     def constraints(self) -> list[cp.Constraint]:
-        """All of (17)."""
+        """Return all constraints of (17)."""
         return [self._imbalance() == 0, *self._limits(), *self._friction_cones()]
 
     def run(self, program: cp.Problem) -> float:
-        """The optimal value of a program in these variables."""
+        """Return the optimal value of a program in these variables."""
         for tolerance in _TOLERANCES:
             tolerances = {f"tol_{name}": tolerance for name in ("feas", "gap_abs", "gap_rel")}
             with warnings.catch_warnings(), contextlib.suppress(cp.SolverError):
@@ -101,7 +110,7 @@ class _Formulation:
         raise SolverError(str(program.status))
 
     def _imbalance(self) -> cp.Expression:
-        """Left side of (12), (6,), with moments about the first contact, not the origin."""
+        """Return the left side of (12), (6,), with moments about the first contact."""
         problem = self.problem
         pivot = problem.p_OC_O[0]
         force = problem.w_ext_O[:3]
@@ -127,13 +136,13 @@ class _Formulation:
         return [*self._torques(), *self._normal_bounds()]
 
     def _torques(self) -> list[cp.Constraint]:
-        """(15), with the sign of the torque that acts on the joints, and (16)."""
+        """Return (15), with the sign of the torque that acts on the joints, and (16)."""
         joints = self.problem.joints
         if joints is None or self.tau is None:
             return []
         tau = joints.tau_g
-        for J, i in zip(joints.J_C, self._hands(), strict=True):
-            tau = tau + J[_rows(self.problem.contacts[i].model)].T @ self.w[i]
+        for J, i in zip(joints.J_C, self.problem.hands, strict=True):
+            tau = tau + J[_ROWS[self.problem.contacts[i].model]].T @ self.w[i]
         constraints = [self.tau == tau]
         for k, (low, high) in enumerate(zip(joints.tau_min, joints.tau_max, strict=True)):
             constraints += [self.tau[k] <= high] if np.isfinite(high) else []
@@ -141,7 +150,7 @@ class _Formulation:
         return constraints
 
     def _normal_bounds(self) -> list[cp.Constraint]:
-        """(7), with the preload."""
+        """Return (7), with the preload."""
         constraints = []
         for contact, f_n in zip(self.problem.contacts, self._normals(), strict=True):
             constraints.append(f_n >= contact.f_n_min)
@@ -152,7 +161,7 @@ class _Formulation:
     def _friction_cones(
         self, s: float | cp.Parameter = 1.0, excess: float | cp.Variable = 0.0
     ) -> list[cp.Constraint]:
-        """(1) and (2) over mu, with s f_n + excess in the place of f_n."""
+        """Return (1) and (2) over mu, with s f_n + excess instead of f_n."""
         constraints = []
         for contact, w in zip(self.problem.contacts, self.w, strict=True):
             e = np.array([contact.e_t, contact.e_o, contact.e_n])
@@ -166,7 +175,7 @@ class _Formulation:
         return constraints
 
     def objective(self) -> cp.Expression:
-        """Phi of (17)."""
+        """Return Phi of (17)."""
         f_n = cp.hstack(self.hand_normals())
         match self.problem.objective:
             case Objective.MAX_NORMAL_FORCE:
@@ -183,10 +192,10 @@ class _Formulation:
         return cp.max(cp.hstack(share))
 
     def _bisected_margin(self) -> float:
-        """Bisects the utilisation s; a phase-1 program finds the least excess over s f_n [N].
+        """Bisect the utilisation s; a phase-1 program finds the least excess over s f_n [N].
 
-        A contact that equilibrium leaves unloaded pins the excess at zero, where its sign is
-        noise: problems with such contacts are beyond this reference.
+        A contact that must be unloaded fixes the excess at zero, and its sign is noise: this
+        reference does not solve problems with such contacts.
         """
         size = max(1.0, float(np.abs(self.problem.w_ext_O).max()))
         excess, s = cp.Variable(), cp.Parameter(nonneg=True, value=1.0)
@@ -204,31 +213,9 @@ class _Formulation:
         return high
 
     def hand_normals(self) -> list[cp.Expression]:
-        """Normal forces of the hands [N]."""
+        """Return the normal forces of the hands [N]."""
         normals = self._normals()
-        return [normals[i] for i in self._hands()]
-
-    def _hands(self) -> list[int]:
-        return [i for i, c in enumerate(self.problem.contacts) if c.role is Role.HAND]
+        return [normals[i] for i in self.problem.hands]
 
     def _normals(self) -> list[cp.Expression]:
         return [w[0] if w.size == 1 else w[2] for w in self.w]
-
-    def _wrenches(self) -> Array:
-        w_OC_C = np.zeros((len(self.w), 6))
-        for row, contact, w in zip(w_OC_C, self.problem.contacts, self.w, strict=True):
-            row[_rows(contact.model)] = w.value
-        return w_OC_C
-
-
-def _rows(model: ContactModel) -> list[int]:
-    """Where the variables of a contact stand in (f_t, f_o, f_n, m_t, m_o, m_n)."""
-    return {
-        ContactModel.FRICTIONLESS: [2],
-        ContactModel.PCWF: [0, 1, 2],
-        ContactModel.SFCE: [0, 1, 2, 5],
-    }[model]
-
-
-def _components(model: ContactModel) -> int:
-    return len(_rows(model))

@@ -1,7 +1,7 @@
-"""Pages: what a result shows, as headings, paragraphs, lists and tables without a medium.
+"""Pages: the presentation of a result as headings, paragraphs, lists and tables.
 
-Every result makes one page; notebooks and recordings show it as Markdown, commands on a terminal.
-Texts are plain: each medium escapes what it would read as more than text.
+Every result makes one page. Notebooks and recordings show it as Markdown, commands on a terminal.
+Texts are plain: each medium escapes them.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from fulcrum.synthesis import markdown
 
 
 class Mark(Enum):
-    """How a piece of text stands out."""
+    """The way in which a piece of text is emphasised."""
 
     STRONG = auto()
     GOOD = auto()
@@ -24,7 +24,7 @@ class Mark(Enum):
 
 @dataclass(frozen=True)
 class Marked:
-    """A piece of text that stands out."""
+    """A piece of emphasised text."""
 
     text: str
     mark: Mark = Mark.STRONG
@@ -43,7 +43,7 @@ class Heading:
 
 @dataclass(frozen=True)
 class Lines:
-    """A paragraph; its lines stay apart where the medium can."""
+    """A paragraph, with line breaks if the medium can show them."""
 
     lines: tuple[Line, ...]
 
@@ -57,7 +57,7 @@ class Bullets:
 
 @dataclass(frozen=True)
 class Table:
-    """Rows under titles, which end in their unit like ``slip [mm]``."""
+    """A table; its titles end in their unit, such as ``slip [mm]``."""
 
     head: tuple[str, ...]
     rows: tuple[tuple[str, ...], ...]
@@ -68,7 +68,7 @@ Block = Heading | Lines | Bullets | Table
 
 @dataclass(frozen=True)
 class Page:
-    """What a result shows, from top to bottom; blocks without content are left out."""
+    """The blocks that present a result, from top to bottom."""
 
     blocks: tuple[Block, ...]
 
@@ -77,13 +77,13 @@ class Page:
 
 
 def page(*blocks: Block | Line) -> Page:
-    """Return a page of blocks; a line alone is a paragraph."""
+    """Return a page of blocks without the empty ones; a line alone is a paragraph."""
     whole = (b if isinstance(b, Block) else Lines((b,)) for b in blocks)
     return Page(tuple(block for block in whole if not _empty(block)))
 
 
 def table(head: Sequence[str], rows: Iterable[Sequence[object]]) -> Table:
-    """Return a table of cells that are shown as plain text."""
+    """Return a table; cells are shown as plain text."""
     return Table(tuple(head), tuple(tuple(str(cell) for cell in row) for row in rows))
 
 
@@ -112,25 +112,23 @@ def _markdown(block: Block) -> str | list[str]:
 def _inline(line: Line, marks: bool = True) -> str:
     parts = []
     for piece in pieces(line):
-        text = piece if isinstance(piece, str) else piece.text
-        shown = _spaced(text)
+        shown = _spaced(piece if isinstance(piece, str) else piece.text)
         parts.append(f"**{shown}**" if marks and isinstance(piece, Marked) else shown)
     return "".join(parts)
 
 
 def _spaced(text: str) -> str:
-    """The text escaped, with a space where it begins or ends with one."""
+    """Return the text escaped, with one space where it begins or ends with space."""
     start, end = text[: len(text) - len(text.lstrip())], text[len(text.rstrip()) :]
     return f"{' ' * bool(start)}{markdown.escaped(text)}{' ' * bool(end)}"
 
 
 def _empty(block: Block) -> bool:
     match block:
-        case Heading():
-            return False
         case Lines():
             return not any(block.lines)
         case Bullets():
             return not block.items
         case Table():
             return not block.rows
+    return False

@@ -1,4 +1,4 @@
-"""Settings classes: a field says its range, its key in scenario files and its doc, and only once.
+"""Settings classes: each field declares its range, its key in scenario files and its doc once.
 
 A settings class is a frozen dataclass whose fields are keys of a table in the scenario file::
 
@@ -7,11 +7,11 @@ A settings class is a frozen dataclass whose fields are keys of a table in the s
         preload: Annotated[NotNegative, Key("preload_n")] = 5.0
         \"""Least normal force of the hands [N].\"""
 
-The annotation says what is valid, the string below the field is its doc. From them follow the check
-when an instance is made, and (:mod:`scenarios.schema.derive`) the file's table, its JSON Schema,
-its documentation and what `fulcrum new` writes. Files and code hold the same number in the same
-unit: there are no conversions. A key is named as its field, with the unit behind it where the field
-is in SI units and has none in its name.
+The annotation is the valid range, and the string below the field is its doc. Instances are checked
+when they are made, and :mod:`scenarios.schema.derive` makes from the same fields the file's table,
+its JSON Schema, its documentation and the output of `fulcrum new`. Files and code have the same
+number in the same unit: there are no conversions. The key is the field's name, followed by the unit
+if the field is in SI units and its name has no unit.
 """
 
 from __future__ import annotations
@@ -26,8 +26,8 @@ from annotated_types import Ge, Gt, Le, Len, Lt
 
 from fulcrum.synthesis.errors import InvalidInputError
 
-# Typing keeps one of equal annotations, and pydantic has these two with integers, too: with 0.0 the
-# schema would depend on which comes first.
+# Integers, because pydantic has the same two annotations with integers and typing keeps only one of
+# equal annotations: with 0.0 the schema would depend on which comes first.
 Positive = Annotated[float, Gt(0)]
 NotNegative = Annotated[float, Ge(0)]
 Share = Annotated[float, Ge(0), Le(1.0)]
@@ -46,33 +46,33 @@ _HINTS: dict[type, dict[str, Any]] = {}
 
 @dataclass(frozen=True)
 class Key:
-    """The key of a field in scenario files.
+    """The key of a field in scenario files, if it is not the field's name.
 
     Attributes:
-        name: Where it is not the field's name; None for a field that files do not have.
+        name: The key; None for a field that files do not have.
     """
 
     name: str | None
 
 
 class Inline:
-    """Marks a field whose own fields are keys of the same table."""
+    """Mark of a field whose own fields are keys of the same table."""
 
 
 class OrInfinite:
-    """Marks a number that may be infinite in code; files have finite numbers only."""
+    """Mark of a number that may be infinite in code, but is finite in files."""
 
 
 class Unlimited:
-    """Marks a number that is infinite where there is no limit, in code and in files."""
+    """Mark of a number that is infinite without a limit, in code and in files."""
 
 
 class Settings:
-    """Base of settings classes: checks every field by its annotation when an instance is made."""
+    """Base of settings classes, which checks every field by its annotation."""
 
     @property
     def label(self) -> str:
-        """What errors call the instance."""
+        """Return the name of the instance in errors."""
         return type(self).__name__.lower()
 
     def __post_init__(self) -> None:
@@ -81,24 +81,20 @@ class Settings:
 
 
 def hints(settings: type) -> dict[str, Any]:
-    """Annotations of the fields of a dataclass, with all that they say."""
+    """Return the annotations of the fields of a dataclass, with their extras."""
     if settings not in _HINTS:
         _HINTS[settings] = get_type_hints(settings, include_extras=True)
     return _HINTS[settings]
 
 
 def said(annotation: Any, kind: type) -> Any:
-    """What of a kind an annotation says, such as its :class:`Key`; None if it says nothing."""
+    """Return the extra of a kind in an annotation, such as its :class:`Key`; None without one."""
     extras = get_args(annotation)[1:] if get_origin(annotation) is Annotated else ()
     return next((extra for extra in extras if extra is kind or isinstance(extra, kind)), None)
 
 
 def check(field: str, annotation: Any, value: Any) -> None:
-    """Refuse a value that is not what its annotation says.
-
-    Raises:
-        InvalidInputError: Names the field, what was given and what is valid.
-    """
+    """Raise InvalidInputError if a value is not valid for its annotation."""
     origin, arguments = get_origin(annotation), get_args(annotation)
     if origin in (Union, UnionType):
         if value is not None:

@@ -40,7 +40,7 @@ class CrosscheckCommand(common.Chosen):
 
     def execute(self) -> int:
         """Run the command; return the exit code: 1 if the engines disagree."""
-        from fulcrum.scenarios.requests import chosen_control
+        from fulcrum.scenarios.functions import chosen_control
         from fulcrum.sim.run import Request
         from fulcrum.sim.run.crosscheck import crosscheck
         from fulcrum.sim.run.crosscheck_picture import draw_crosscheck
@@ -83,7 +83,7 @@ class CrosscheckCommand(common.Chosen):
 
     def _worlds(self, chosen: Scenario) -> dict[str, tuple[World, int]]:
         """Return the nominal world and those drawn, each with its seed, by name."""
-        from fulcrum.scenarios.requests import drawn_world
+        from fulcrum.scenarios.functions import drawn_world
         from fulcrum.sim.world import NO_DEVIATION
 
         whole("--episodes", self.episodes, least=0)

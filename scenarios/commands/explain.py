@@ -35,7 +35,7 @@ class ExplainCommand(common.Chosen):
     def execute(self) -> int:
         """Run the command; return the exit code: 0 feasible, 1 infeasible."""
         from fulcrum.scenarios import functions
-        from fulcrum.scenarios.requests import chosen_control
+        from fulcrum.scenarios.functions import chosen_control
         from fulcrum.sim.planning import borne
         from fulcrum.sim.run import write_json
 
@@ -72,7 +72,7 @@ class CapacityCommand(common.Chosen):
     def execute(self) -> int:
         """Run the command; return the exit code: 1 if a run does not confirm the capacity."""
         from fulcrum.scenarios import functions
-        from fulcrum.scenarios.requests import chosen_control
+        from fulcrum.scenarios.functions import chosen_control
         from fulcrum.sim.evaluation import Verdict
         from fulcrum.sim.run import confirm, write_json
 

@@ -69,10 +69,10 @@ class PlaceCommand(common.Chosen):
     def execute(self) -> int:
         """Run the command; return the exit code: 1 if nothing better was found."""
         from fulcrum.scenarios import functions
+        from fulcrum.scenarios.functions import chosen_control
         from fulcrum.scenarios.reading.file import bring_schema, made
         from fulcrum.scenarios.reading.placed import placed
         from fulcrum.scenarios.reading.source import Source
-        from fulcrum.scenarios.requests import chosen_control
         from fulcrum.sim.placement import Effort, placement_page
         from fulcrum.sim.placement.picture import draw
 

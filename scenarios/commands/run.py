@@ -81,7 +81,7 @@ class RunCommand(common.Planned):
 
     def _request(self) -> tuple[Request, Preparation]:
         """Return what to run, and what is prepared of it."""
-        from fulcrum.scenarios.requests import chosen_engine, prepared_request
+        from fulcrum.scenarios.functions import chosen_engine, prepared_request
         from fulcrum.sim.world import parse_values
 
         common.check_results_folder(self.out)

@@ -119,7 +119,7 @@ class SweepCommand(common.Planned):
         return common.PASSED if enough else common.FAILED
 
     def _sweep(self) -> Sweep:
-        from fulcrum.scenarios.requests import sweep_design
+        from fulcrum.scenarios.functions import sweep_design
         from fulcrum.sim.world import parse_grid
 
         chosen, names = self.chosen(), None

@@ -16,7 +16,7 @@ from fulcrum.scenarios.reading.access import Access
 from fulcrum.scenarios.reading.build import build
 from fulcrum.scenarios.reading.places import vector
 from fulcrum.scenarios.reading.source import FileError, Source, explained, nearest
-from fulcrum.scenarios.schema.keys import FileTable
+from fulcrum.scenarios.schema.kinds import FileTable
 from fulcrum.scenarios.schema.tables import LiftedFile, ScenarioFile
 from fulcrum.scenarios.schema.walk import json_schema
 from fulcrum.sim.scenario import HOLD, Pivot, Scenario, lifted, tilting

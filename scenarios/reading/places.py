@@ -9,7 +9,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from fulcrum.scenarios.reading.source import KeyPath, Source
-from fulcrum.scenarios.schema.keys import Placed
+from fulcrum.scenarios.schema.kinds import Placed
 from fulcrum.sim.geometry import Geom, Quaternion, Shape, wxyz
 from fulcrum.sim.geometry.shapes import Box, Cylinder
 from fulcrum.sim.model import across

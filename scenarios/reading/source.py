@@ -12,7 +12,7 @@ from typing import Any
 
 from pydantic import ValidationError
 
-from fulcrum.scenarios.schema.keys import CORNER, NAME, PREFIX
+from fulcrum.scenarios.schema.kinds import CORNER, NAME, PREFIX
 from fulcrum.scenarios.schema.walk import table_at
 from fulcrum.synthesis import InvalidInputError
 
@@ -40,7 +40,7 @@ _BOUNDS = {
     "less_than": ("<", "lt"),
     "less_than_equal": ("<=", "le"),
 }
-# What the patterns of :mod:`scenarios.schema.keys` say, in words.
+# What the patterns of :mod:`scenarios.schema.kinds` say, in words.
 _FORMS = {
     NAME: "a name of letters, digits, _ and - that begins with a letter",
     CORNER: 'a corner of the box such as "-x +y -z"',

@@ -21,7 +21,7 @@ from annotated_types import Len
 from pydantic import Field, GetCoreSchemaHandler, create_model
 from pydantic_core import CoreSchema, core_schema
 
-from fulcrum.scenarios.schema.keys import FileTable
+from fulcrum.scenarios.schema.kinds import FileTable
 from fulcrum.synthesis.settings import Inline, Key, Settings, Unlimited, hints, said
 
 

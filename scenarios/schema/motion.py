@@ -8,7 +8,7 @@ from annotated_types import Len
 from pydantic import Discriminator, Field, Tag
 
 from fulcrum.scenarios.schema.derive import FromTable, same
-from fulcrum.scenarios.schema.keys import PREFIX, Corner, Direction, FileTable, Placed, Vector3
+from fulcrum.scenarios.schema.kinds import PREFIX, Corner, Direction, FileTable, Placed, Vector3
 from fulcrum.sim.scenario import REACH, TILT, Angle, Duration, Gap, Phase, Pivot, Robot, Scenario
 from fulcrum.synthesis.settings import NotNegative, Positive, Text
 

@@ -14,7 +14,7 @@ from annotated_types import Len
 from pydantic import Field
 
 from fulcrum.scenarios.schema.derive import FromTable, derived, same
-from fulcrum.scenarios.schema.keys import (
+from fulcrum.scenarios.schema.kinds import (
     Colour,
     Corner,
     Direction,

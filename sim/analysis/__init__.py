@@ -1,4 +1,4 @@
-"""Questions about a scenario without a run: why not, how heavy, what is in the way."""
+"""Analysis of a scenario without a run: feasibility, capacity, limits, surroundings."""
 
 from fulcrum.sim.analysis.capacity import capacities
 from fulcrum.sim.analysis.explain import tightest_tilt

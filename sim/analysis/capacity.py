@@ -1,8 +1,8 @@
 """The heaviest object that a scenario's robot can pivot, and lift, as optimisation over its weight.
 
 At each tilt the largest weight that contacts and joints can hold is the optimum of one second-order
-cone program; the least of these over the path is the capacity, and the certificate just above it
-says what limits it. Runs in closed loop confirm it; they do not find it.
+cone program. The capacity is the least of these over the path. The certificate of infeasibility
+just above it shows what limits it. Runs in closed loop only confirm the capacity.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ from fulcrum.synthesis.analysis.conflict import conflict
 from fulcrum.synthesis.render import Marked, Page, page
 
 _STEP_DEG = 1.0
-# How well the tightest tilt is found [deg].
+# Accuracy of the tightest tilt [deg].
 _TILT_DEG = 1e-3
 
 
@@ -90,11 +90,11 @@ class Capacity:
 def capacities(
     scenario: Scenario, control: Control, progress: Progress | None = None
 ) -> tuple[Capacity, ...]:
-    """Return what can be pivoted, if there are supports, and what can be lifted without them.
+    """Return the capacity for pivoting, if there are supports, and that for lifting without them.
 
     Args:
-        scenario: The scene; its object's mass is where the search starts from.
-        control: The controller, whose margins count.
+        scenario: Scene; the search starts at the mass of its object.
+        control: Settings of the controller, which give the margins.
         progress: Called with tilts done and tilts in total.
 
     Raises:

@@ -1,4 +1,4 @@
-"""Explains why no forces exist and what to change, or how much a feasible problem may change."""
+"""Explanations: why no forces exist, what to change, or how much may change."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ from fulcrum.synthesis.problem import Gravity
 
 # Steps of the scan for the tightest tilt [deg].
 _SCAN_DEG = 5.0
-# How near to its limit, relative, a force, torque or utilisation counts as at it.
+# Relative distance to its limit below which a force, torque or utilisation counts as at it [-].
 _ACTIVE = 1e-6
 
 
@@ -46,7 +46,7 @@ def tightest_tilt(problems: PathProblems, synthesizer: Synthesizer) -> float:
             return float(tilt)
         heaviest.append(high)
     if math.isinf(min(heaviest)):
-        # Without limits any weight can be held: then where the objective is largest.
+        # Without limits any weight can be held: return the tilt with the largest objective.
         values = [synthesizer.solve(problems.problem(tilt)).value for tilt in tilts]
         return float(tilts[int(np.argmax(values))])
     return float(tilts[int(np.argmin(heaviest))])
@@ -165,7 +165,7 @@ def _active(solution: Solution) -> tuple[str, ...]:
 
 
 def _words(change: Change, problem: Problem, gravity: Gravity) -> str:
-    """Return a change in a few words, with the numbers that it stands for."""
+    """Return a change in a few words, with the resulting numbers."""
     kind, factor = change.kind, change.factor
     if change.outcome is ChangeOutcome.ABSENT:
         return f"there are no {kind}"
@@ -180,8 +180,8 @@ def _words(change: Change, problem: Problem, gravity: Gravity) -> str:
         if kind is Kind.WEIGHT:
             return "any weight"
         return f"by a factor of {factor:.3g} or less" if factor else "to any value, even 0"
-    # More friction, torque or grip, or less weight, is what an infeasible problem needs; a feasible
-    # one allows for the opposite.
+    # An infeasible problem needs more friction, torque or grip, or less weight; a feasible one
+    # allows for the opposite.
     needed = (factor > 1.0) is (kind is not Kind.WEIGHT)
     more, less = ("to at least", "to at most") if needed else ("up to", "down to")
     text = f"{more if factor > 1.0 else less} {factor:.4g} times"
@@ -195,7 +195,7 @@ def _words(change: Change, problem: Problem, gravity: Gravity) -> str:
 
 
 def _numbers(values: dict[str, float], unit: str) -> str:
-    """Return values by name, equal ones together."""
+    """Return the names with their values as text, names with equal values together."""
     names: dict[str, list[str]] = {}
     for name, value in values.items():
         if math.isfinite(value):

@@ -7,17 +7,17 @@ from dataclasses import dataclass
 from fulcrum.synthesis.analysis import ChangeOutcome, Conflict, Kind, Sensitivities
 from fulcrum.synthesis.render import Mark, Marked, Page, page, table
 
-# Share by which a limit is relaxed to see whether that helps [-].
+# Share by which a limit is relaxed to test whether that helps [-].
 RELAXED = 0.1
-# Number of constraints named that limit a change.
+# Largest number of constraints shown that limit a change.
 _NAMED = 4
-# Relative slopes by the centre of mass below this are not shown [1/m]: 0.001 % per mm.
+# Smallest relative sensitivity to the centre of mass that is shown [1/m]: 0.001 % per mm.
 _VISIBLE_PER_M = 0.01
 
 
 @dataclass(frozen=True)
 class Remedy:
-    """One kind of change on its own: how much of it is needed, or is possible.
+    """One kind of change on its own, and how much of it is needed or possible.
 
     Attributes:
         outcome: See :class:`synthesis.analysis.relaxation.ChangeOutcome`.
@@ -37,7 +37,7 @@ class Remedy:
 
 @dataclass(frozen=True)
 class Influence:
-    """Effect of a parameter on the objective.
+    """The effect of a parameter on the objective.
 
     Attributes:
         value: Value of the parameter.
@@ -58,7 +58,7 @@ class Optimum:
 
     Attributes:
         value: Value of the objective, in ``unit``.
-        unit: N, N·m or -.
+        unit: Unit of the objective: N, N·m or -.
         normal_forces: Normal force of each contact [N].
         active: Limits that are reached.
         sensitivities: Derivatives of the value.
@@ -96,12 +96,12 @@ class Optimum:
 
 @dataclass(frozen=True)
 class Explanation:
-    """What limits a scenario's problem at one tilt, and by how much.
+    """An explanation of what limits a scenario's problem at one tilt, and by how much.
 
     Attributes:
         scenario: Name of the scenario.
         object: Name of the object.
-        objective: What is minimised.
+        objective: Objective that is minimised.
         tilt_deg: Tilt [deg].
         weight: Weight of the object [N].
         feasible: Whether forces exist that hold the object.
@@ -109,7 +109,7 @@ class Explanation:
         gains: Relative gain of the weight that can be held [-] if only this limit of the conflict
             is relaxed by ``RELAXED``; empty if no weight can be held.
         optimum: Solution of a feasible problem; else None.
-        changes: What each kind of change needs to be on its own, or may be.
+        changes: Needed or possible size of each kind of change on its own.
     """
 
     scenario: str
@@ -127,7 +127,7 @@ class Explanation:
         """Return verdict, conflict or optimum, and changes as a page.
 
         Args:
-            controller: Name of the controller whose margins count.
+            controller: Name of the controller whose margins are used.
         """
         verdict = Marked("FEASIBLE", Mark.GOOD) if self.feasible else Marked("INFEASIBLE", Mark.BAD)
         shown = page(
@@ -154,7 +154,7 @@ class Explanation:
 
 
 def _conflict_page(conflict: Conflict, gains: dict[str, float]) -> Page:
-    """Return the sentence of a conflict, and its limits with what each provides and would gain."""
+    """Return a conflict as a page: its sentence, and share and gain of each of its limits."""
     sentence = conflict.sentence
     rows = []
     for name in conflict.limits:

@@ -1,4 +1,4 @@
-"""What can be said of a scenario before anything moves: reach, and forces over the whole path."""
+"""Feasibility of a scenario before anything moves: reach, forces over the path, surroundings."""
 
 from __future__ import annotations
 
@@ -31,22 +31,22 @@ from fulcrum.synthesis.robust import RobustInfeasibleError
 
 # Steps of the tilt [deg].
 _STEP_DEG = 2.5
-# By how much longer a tilt is tried where speed limits stop it.
+# Factors on the duration of the tilt that are tried if speed limits are exceeded [-].
 _SLOWER = (1.5, 2.0, 4.0)
 
 
 @dataclass(frozen=True, eq=False)
 class Curves:
-    """What is needed over the tilt; NaN where there are no forces.
+    """The forces, torques and friction needed over the tilt; NaN where there are no forces.
 
     Attributes:
-        tilts_deg: (k,).
+        tilts_deg: Tilts [deg], (k,).
         grip: Normal forces of the hands [N], (k, n).
         torque: Largest share of a torque limit that is used [-], (k,); NaN without joints.
-        joint: Whose it is, by tilt; empty without joints.
+        joint: Joint with that share, by tilt; empty without joints.
         used: Largest share of the friction that these forces use [-], (k,).
-        contact: Whose it is, by tilt.
-        least_used: The same of the forces that use as little as can be [-], (k,).
+        contact: Contact with that share, by tilt.
+        least_used: Largest share for the forces that make it as small as possible [-], (k,).
     """
 
     tilts_deg: Array
@@ -59,22 +59,23 @@ class Curves:
 
     @property
     def holds(self) -> bool:
-        """Whether there are forces at every tilt."""
+        """Whether forces exist at every tilt."""
         return bool(np.isfinite(self.used).all())
 
 
 @dataclass(frozen=True, eq=False)
 class Feasibility:
-    """Whether a scenario can be done, and why not.
+    """The answer whether a scenario is feasible, with the reasons.
 
     Attributes:
         unreachable: Why the arms cannot follow the path; None if they can.
-        slower: By which factor the tilt would have to last longer, where that alone helps.
+        slower: Factor on the duration of the tilt with which the arms can follow [-]; None if no
+            tried factor helps, or none is needed.
         clearances: Smallest distance of each joint to the ends of its range [rad or m].
-        curves: Forces over the tilt; without joints where the arms cannot follow.
-        grip: The least grip over the tilt, if the controller asks for one.
-        explanation: Why there are no forces, at the first tilt where there are none.
-        surroundings: Whether the object fits what it stands on and what is in its way.
+        curves: Forces over the tilt; without joints if the arms cannot follow.
+        grip: Least grip over the tilt; None if the controller asks for none.
+        explanation: Why there are no forces, at the first tilt without forces; else None.
+        surroundings: Result of comparing the object's path with the surfaces around it.
     """
 
     unreachable: PathError | None
@@ -87,16 +88,16 @@ class Feasibility:
 
     @property
     def feasible(self) -> bool:
-        """Whether arms and forces can do it, and surfaces leave room and bear the object."""
+        """Whether the arms can follow, forces exist, and the path fits the surroundings."""
         fits = not self.surroundings.misfits
         return fits and self.unreachable is None and self.curves.holds
 
     def page(self, scenario: Scenario, controller: str) -> Page:
-        """Return the answers, and why not, as a page.
+        """Return the answers and their reasons as a page.
 
         Args:
-            scenario: What was asked about.
-            controller: Name of the controller whose margins count.
+            scenario: Scenario that was examined.
+            controller: Name of the controller whose margins were used.
         """
         verdict = (
             Marked("FEASIBLE", Mark.GOOD) if self.feasible else Marked("NOT FEASIBLE", Mark.BAD)
@@ -165,11 +166,11 @@ class Feasibility:
 
 
 def feasibility(scenario: Scenario, control: Control) -> Feasibility:
-    """Looks at the whole path.
+    """Examine the whole path of a scenario.
 
     Args:
-        scenario: The scene.
-        control: Whose margins and grip count.
+        scenario: Scene.
+        control: Settings of the controller, which give margins and grip.
     """
     unreachable, slower, joint_path = None, None, None
     try:
@@ -192,7 +193,7 @@ def feasibility(scenario: Scenario, control: Control) -> Feasibility:
 
 
 def _slower(scenario: Scenario, error: PathError) -> float | None:
-    """The least of some factors by which a longer tilt suits the arms; None if none does."""
+    """Return the least tried factor on the tilt's duration that lets the arms follow, or None."""
     turns = tilting(scenario.phases)
     if not turns or not any("speed limit" in reason for reason in error.reasons):
         return None
@@ -207,7 +208,7 @@ def _slower(scenario: Scenario, error: PathError) -> float | None:
 
 
 def _grip(scenario: Scenario, control: Control, joint_path: JointPath) -> GripSchedule | None:
-    """The controller's least grip; None if it asks for none, or if nothing can be held at all."""
+    """Return the controller's least grip; None if it asks for none or nothing can be held."""
     try:
         return plan_grip(scenario, control, joint_path)
     except (RobustInfeasibleError, SolverError):
@@ -215,7 +216,7 @@ def _grip(scenario: Scenario, control: Control, joint_path: JointPath) -> GripSc
 
 
 def _solve(problem: Problem, synthesizer: Synthesizer) -> tuple[Problem, Solution | None]:
-    """The problem, and its solution if there is one."""
+    """Return the problem, and its solution if there is one."""
     try:
         return problem, synthesizer.solve(problem)
     except InfeasibleError:
@@ -223,7 +224,7 @@ def _solve(problem: Problem, synthesizer: Synthesizer) -> tuple[Problem, Solutio
 
 
 def _least_used(problem: Problem, synthesizer: Synthesizer) -> float:
-    """The least share of the friction that any forces use [-]; NaN if that has no optimum."""
+    """Return the least possible share of the friction in use [-]; NaN if there is no optimum."""
     try:
         margin = replace(problem, objective=Objective.FRICTION_MARGIN)
         return synthesizer.solve(margin).value
@@ -249,7 +250,7 @@ def _curves(
             joint.append("")
             contact.append("")
             continue
-        # Of all the friction that is believed to be there.
+        # Share of the full friction of the scenario, without the controller's margin.
         share = control.friction_factor * solution.utilisation
         grip[k] = solution.w_OC_C[:hands, N]
         used.append(float(share.max()))
@@ -270,7 +271,7 @@ def _curves(
 
 
 def _torque(solution: Solution) -> tuple[str, float]:
-    """The joint that uses most of its torque limit, and the share [-]."""
+    """Return the joint that uses most of its torque limit, and that share [-]."""
     joints = solution.problem.joints
     if joints is None:
         return "", np.nan

@@ -1,16 +1,17 @@
 r"""The contact forces of a logged state under hard Coulomb friction, by Pinocchio's own solver.
 
-From the state, the torques and the torsional moments, which Pinocchio's contacts do not have,
-follow the accelerations without contact forces. The forces f, in each contact's axes and friction
-cone K, are those at which no contact accelerates into the other body or slips inside its cone:
+State, torques and torsional moments give the accelerations without contact forces. (The moments are
+inputs, as Pinocchio's contacts have none.) The forces f, in the axes of each contact and its
+friction cone K, are those at which no contact accelerates into the other body or slips inside its
+cone:
 
 .. math:: K \ni f \perp G f + g \in K^*, \qquad
     G = J M^{-1} J^T, \quad g = J \dot v_{free} + \dot J v
 
 (with De Saxce's correction of g). There is neither stiffness nor regularisation in it. Where
-columns of G depend on each other, as along the line between two supports of a rigid object, forces
-are not determined; those components are marked. What slides or bounces is not told from what
-sticks: the comparison is one for contacts that hold.
+columns of G depend on each other, as along the line between two supports of a rigid object, the
+forces are not determined; those components are marked. The forces are valid only for contacts that
+neither slide nor bounce.
 """
 
 from __future__ import annotations
@@ -31,7 +32,7 @@ from fulcrum.synthesis.arrays import M_N, Array, Mask, N
 
 # Step of the finite difference of a Jacobian along the motion [s].
 _H = 1e-5
-# Of the largest eigenvalue of G: below, a combination of forces moves nothing.
+# Eigenvalues of G below this share of the largest count as zero: such forces move nothing [-].
 _RANK = 1e-9
 _TOLERANCE = 1e-7
 _EVERY_S = 0.1
@@ -40,11 +41,11 @@ _ITERATIONS = 10_000
 
 @dataclass(frozen=True, eq=False)
 class HardForces:
-    """Contact forces of k rows and m contacts.
+    """The contact forces of k rows and m contacts.
 
     Attributes:
         f_C: Forces on the object in contact axes [N], (k, m, 3); NaN where none was found.
-        determined: Components that the state and the torques determine, (k, m, 3).
+        determined: Whether state and torques determine the component, (k, m, 3).
     """
 
     f_C: Array
@@ -53,7 +54,7 @@ class HardForces:
 
 @dataclass(frozen=True)
 class StaticDifference:
-    """How the hard forces of one contact differ from the plant's, where they are determined.
+    """The difference of one contact's hard forces from the plant's, where they are determined.
 
     Attributes:
         normal_rms_n: RMS of the difference of the normal forces [N].
@@ -73,12 +74,15 @@ class StaticDifference:
 def static_differences(
     scenario: Scenario, trace: Trace, history: ContactHistory
 ) -> dict[str, StaticDifference]:
-    """Compare hard contact forces with the plant's, by contact, ten times a second of full grip.
+    """Compare hard contact forces with the plant's, ten times per second of full grip.
 
     Args:
-        scenario: What the plant is.
-        trace: The run, without deviations of the robot from its model.
-        history: The plant's contact forces.
+        scenario: True scenario, as the plant has it.
+        trace: Trace of a run in which the robot does not deviate from its model.
+        history: Contact forces of the plant.
+
+    Returns:
+        Difference by name of the contact.
     """
     stride = max(1, round(_EVERY_S / scenario.physics.timestep))
     held = Schedule(scenario).held[trace.phase.astype(int)]
@@ -103,7 +107,7 @@ def static_differences(
 
 
 class HardContacts:
-    """Finds the contact forces of logged states of a scenario."""
+    """A solver for the contact forces of a scenario's logged states."""
 
     def __init__(self, scenario: Scenario) -> None:
         self._scenario, self._robot = scenario, RobotModel(scenario)
@@ -118,7 +122,7 @@ class HardContacts:
             setattr(self._settings, f"relative_{kind}_tol", _TOLERANCE)
 
     def forces(self, trace: Trace, rows: NDArray[np.intp]) -> HardForces:
-        """Return the forces of some rows of a trace, of those contacts that touch there."""
+        """Return the forces of the touching contacts in some rows of a trace."""
         picked = trace.pick(rows)
         R_WO = rotations(picked.quat_WO)
         R_WC = self._frames.in_world(R_WO)
@@ -139,13 +143,13 @@ class HardContacts:
     def _problem(
         self, trace: Trace, i: int, R_WO: Array, R_WC: Array, here: NDArray[np.intp]
     ) -> tuple[Array, Array]:
-        """G and g of the contacts that touch, in their axes."""
+        """Return G and g of the touching contacts, in contact axes."""
         thing, robot, hands = self._scenario.object, self._robot, self._hands
         q, qd, p_WC = trace.q[i], trace.qd[i], trace.p_WC[i]
         inertia = R_WO @ thing.inertia_O @ R_WO.T
         center = trace.p_WO[i] + R_WO @ thing.center_of_mass
         omega = trace.twist_WO[i, 3:]
-        # Unknown accelerations: of the joints, of the centre of mass, of the turning.
+        # Unknowns: accelerations of the joints, of the centre of mass, and of the rotation.
         joints = len(q)
         M = np.zeros((joints + 6, joints + 6))
         forces = np.zeros(joints + 6)
@@ -168,7 +172,7 @@ class HardContacts:
             if contact < hands:
                 J[:, :joints] = -J_hands[contact, :3]
                 bias = bias - bias_hands[contact]
-                # The torsional moment is known, and acts on both.
+                # The torsional moment is known; it acts on hand and object.
                 forces[joints + 3 :] += trace.f_W[i, contact, 3] * R_CW[N]
                 forces[:joints] -= trace.f_W[i, contact, 3] * J_hands[contact, M_N]
             rows.append(J)
@@ -178,7 +182,7 @@ class HardContacts:
         return J_C @ M_inv_J, M_inv_J.T @ forces + np.concatenate(biases)
 
     def _hand_bias(self, q: Array, qd: Array, p_WC: Array, R_WC: Array, J_C: Array) -> Array:
-        """Acceleration of the hands' points at constant joint speeds, in contact axes, (n, 3)."""
+        """Return the hands' accelerations at constant joint speeds, in contact axes, (n, 3)."""
         moved = np.einsum("nij,njl,l->ni", R_WC, J_C[:, :3], qd)
         ends = []
         for h in (_H, -_H):

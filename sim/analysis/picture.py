@@ -1,4 +1,4 @@
-"""What a scenario needs over its tilt, as one picture: grip, torque, friction."""
+"""The picture of a scenario's feasibility: grip, torque and friction over the tilt."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from matplotlib import pyplot as plt
 
 
 def draw(scenario: Scenario, controller: str, found: Feasibility, file: Path) -> None:
-    """Writes the picture as PNG; tilts without forces are red."""
+    """Write the picture as PNG; tilts without forces are red."""
     curves = found.curves
     canvas, axes = plt.subplots(3, 1, figsize=(8, 8), sharex=True, layout="constrained")
     for hand, grip in zip(scenario.hands, curves.grip.T, strict=True):

@@ -1,4 +1,4 @@
-"""What the object meets along its path: surfaces that it goes through, stands on, or leaves."""
+"""Checks of the object's path against the surfaces around it: overlap, supports, toppling."""
 
 from __future__ import annotations
 
@@ -16,25 +16,25 @@ from fulcrum.sim.model.object_path import object_path
 from fulcrum.sim.scenario import Scenario
 from fulcrum.synthesis.arrays import Array
 
-# How far things may be from where they should be [m]: what a contact may be off its surface, too.
+# Tolerance of all places [m]; also the allowed distance of a contact from its surface.
 _NEAR = 1e-3
 # Steps of the tilt [deg]: a corner 0.5 m from the axis moves by less than 5 mm.
 _STEP_DEG = 0.5
-# Tangent planes that stand for a round wall: 0.05 mm off at a radius of 0.18 m.
+# Number of tangent planes that replace a round wall: error 0.05 mm at a radius of 0.18 m.
 _ROUND = 128
-# Rings of tangent planes that stand for a rounded end.
+# Number of rings of tangent planes that replace a rounded end.
 _RINGS = 33
-# A plane whose normal has so much of z is level [-].
+# Least z component of the normal of a level plane [-].
 _LEVEL = 0.999
 
 
 @dataclass(frozen=True)
 class Misfit:
-    """Object and surfaces that do not fit together.
+    """A misfit between the object's path and a surface.
 
     Attributes:
-        tilt_deg: Where that is worst, or where the object is let go [deg].
-        off_m: By how far [m]; infinite where nothing is under the object.
+        tilt_deg: Tilt at which it is worst, or at which the object is let go [deg].
+        off_m: Size of the misfit [m]; infinite if nothing is under the object.
         text: What is wrong and what helps, in one sentence.
     """
 
@@ -45,12 +45,12 @@ class Misfit:
 
 @dataclass(frozen=True)
 class Surroundings:
-    """How the path fits what stands around it; None where it does.
+    """The misfits between the object's path and the surfaces around it; None where there is none.
 
     Attributes:
-        supports: A support that is off its surface, or moves.
-        room: A surface that the object goes through.
-        stand: Where the object topples with no hand on it.
+        supports: Support that is off its surface, or moves.
+        room: Surface that the object goes through.
+        stand: Tilt at which the object topples with no hand on it.
     """
 
     supports: Misfit | None
@@ -59,13 +59,13 @@ class Surroundings:
 
     @property
     def misfits(self) -> tuple[Misfit, ...]:
-        """All there are."""
+        """All misfits."""
         every = (self.supports, self.room, self.stand)
         return tuple(misfit for misfit in every if misfit is not None)
 
 
 def surroundings(scenario: Scenario) -> Surroundings:
-    """Looks at the object's path without robots.
+    """Check the object's path against the surfaces around it, without the robots.
 
     Raises:
         InvalidInputError: The scene cannot be composed.
@@ -79,7 +79,7 @@ def surroundings(scenario: Scenario) -> Surroundings:
 
 
 def _supports(scenario: Scenario, path: ObjectPath, tilts: Array) -> Misfit | None:
-    """The first support that is not on its surface at the start, else the one that moves most."""
+    """Return the first support that starts off its surface, else the one that moves most."""
     surfaces = {geom.name: geom for geom in scenario.environment}
     poses = [path.pose(tilt) for tilt in tilts.tolist()]
     moving: list[Misfit] = []
@@ -107,7 +107,7 @@ def _supports(scenario: Scenario, path: ObjectPath, tilts: Array) -> Misfit | No
 
 
 def _room(scenario: Scenario, path: ObjectPath, tilts: Array) -> Misfit | None:
-    """The surface into which the object goes farthest."""
+    """Return the surface into which the object goes farthest."""
     model = compose(scenario, ObjectMotion.POSED).compile()
     data, thing = mujoco.MjData(model), model.body(scenario.object.name).mocapid[0]
     pairs = [(model.geom(g).id, model.geom(s).id) for g, s in _meeting(scenario)]
@@ -133,18 +133,18 @@ def _room(scenario: Scenario, path: ObjectPath, tilts: Array) -> Misfit | None:
 
 
 def _meeting(scenario: Scenario) -> list[tuple[str, str]]:
-    """Geoms of the object, and what is in their way: where it rests, those that touch alone."""
+    """Return pairs of a geom of the object and a surface, to be checked for overlap."""
     return [*_resting(scenario), *object_pairs(scenario)]
 
 
 def _resting(scenario: Scenario) -> list[tuple[str, str]]:
-    """Geoms of the object, and the surface on which each may lie."""
+    """Return pairs of a geom of the object and a surface on which it may lie."""
     pairs = [(s.geom, s.surface) for s in scenario.supports]
     return list(dict.fromkeys([*pairs, *((r.geom, r.surface) for r in scenario.rests)]))
 
 
 def _stand(scenario: Scenario, path: ObjectPath) -> Misfit | None:
-    """The first tilt at which no hand holds the object, but it does not stand."""
+    """Return the first tilt at which no hand holds the object and it does not stand."""
     own = {geom.name: _planes(geom) for geom in scenario.object.geoms}
     others = {geom.name: _planes(geom) for geom in scenario.environment}
     shares = [0.0, *(phase.tilt for phase in scenario.phases if phase.grip == 0.0)]
@@ -161,19 +161,19 @@ def _stand(scenario: Scenario, path: ObjectPath) -> Misfit | None:
 
 
 def _tops(planes: Array) -> Array:
-    """Of the planes around a surface, (h, 4), its top alone; all of them if it has none."""
+    """Return the level top of the planes around a surface, (h, 4), or all if there is none."""
     tops = planes[planes[:, 2] > _LEVEL]
     return tops if len(tops) else planes
 
 
 def _toppling(scenario: Scenario, share: float, beside: Array, flat: bool) -> Misfit:
-    """What is wrong with an object that is not held, and does not stand.
+    """Return the misfit of an object that is not held and does not stand.
 
     Args:
-        scenario: The scene.
-        share: Of the path's angle at which that is [-].
-        beside: From what it stands on to its centre of mass [m], (2,).
-        flat: Whether it would stand if what is under it were large enough.
+        scenario: Scene.
+        share: Tilt, as a share of the path's angle [-].
+        beside: Horizontal vector from the area on which it stands to its centre of mass [m], (2,).
+        flat: Whether it would stand if the surfaces under it were large enough.
     """
     off, tilt = math.hypot(*beside), share * scenario.path.angle_deg
     surfaces = " and ".join(dict.fromkeys(surface for _, surface in _resting(scenario)))
@@ -192,11 +192,11 @@ def _toppling(scenario: Scenario, share: float, beside: Array, flat: bool) -> Mi
 
 
 def _beside(regions: list[Array], center: Array) -> Array:
-    r"""From where an object stands to below its centre of mass [m], (2,); infinite without places.
+    r"""Return the horizontal vector from an object's support area to its centre of mass [m], (2,).
 
-    It stands if its centre of mass is over the convex hull of all places where it touches; a wall
-    it leans on counts as if it could not slide there. With :math:`A_s x \le b_s` where it touches
-    surface s, the nearest point of the hull's shadow is found by
+    An object stands if its centre of mass is above the convex hull of all places where it touches;
+    it is assumed not to slide on a wall on which it leans. With :math:`A_s x \le b_s` where it
+    touches surface s, the nearest point of the projected hull is found by
 
     .. math::
         \min_{y, \lambda, e} \|e\| \quad \text{s.t.} \quad A_s y_s \le \lambda_s b_s, \quad
@@ -205,9 +205,12 @@ def _beside(regions: list[Array], center: Array) -> Array:
     Source: Balas 1998, Disjunctive Programming: the convex hull of a union of polytopes.
 
     Args:
-        regions: By surface the planes around what is in object and surface: outward normals and
-            offsets, n x + d <= 0 inside, (h, 4) each.
+        regions: Planes around the common region of object and surface, (h, 4) for each surface:
+            outward normals and offsets, n x + d <= 0 inside.
         center: Centre of mass [m], (3,).
+
+    Returns:
+        Vector, zero if the object stands; infinite if it touches nothing.
     """
     if not regions:
         return np.full(2, np.inf)
@@ -216,7 +219,7 @@ def _beside(regions: list[Array], center: Array) -> Array:
     row = 0
     for s, region in enumerate(regions):
         rows[row : row + len(region), 4 * s : 4 * s + 4] = region
-        # Faces that just touch have half of what is near to either side in common.
+        # Planes are moved outwards by half the tolerance, so that touching faces overlap.
         rows[row : row + len(region), 4 * s + 3] -= _NEAR / 2.0
         row += len(region)
     rows[row:, count:-1], rows[row:, -1] = _ring(), -1.0  # length of e
@@ -233,18 +236,18 @@ def _beside(regions: list[Array], center: Array) -> Array:
 
 
 def _moved(planes: Array, R: Array, p: Array) -> Array:
-    """Planes of a frame, (h, 4), in the parent's, in which it has that pose."""
+    """Return planes, (h, 4), in the parent's frame, in which their own frame has the pose R, p."""
     normals = planes[:, :3] @ R.T
     return np.column_stack([normals, planes[:, 3] - normals @ p])
 
 
 def _planes(geom: Geom) -> Array:
-    """The planes around a geom's convex hull in its owner's frame: n x + d <= 0 inside, (h, 4)."""
+    """Return planes of a geom's convex hull in its owner's frame, n x + d <= 0 inside, (h, 4)."""
     size, upright = np.asarray(geom.size), np.eye(3)[2:]
     if geom.file is not None:
         hull = read_mesh(f"{geom.name}.file", geom.file, geom.size).hull
         normals, reach = hull[:, :3], hull[:, 3]
-    elif geom.kind == "plane":  # which MuJoCo has go on for ever
+    elif geom.kind == "plane":  # infinite in MuJoCo
         normals, reach = upright, np.zeros(1)
     elif geom.kind == "box":
         normals = np.vstack([np.eye(3), -np.eye(3)])
@@ -270,7 +273,7 @@ def _planes(geom: Geom) -> Array:
 
 
 def _ring() -> Array:
-    """Directions all around, (_ROUND, 2)."""
+    """Return unit vectors at equal angles around a circle, (_ROUND, 2)."""
     angles = 2.0 * np.pi / _ROUND * np.arange(_ROUND)
     return np.column_stack([np.cos(angles), np.sin(angles)])
 

@@ -1,4 +1,4 @@
-"""From measured state to torques: synthesis, drives, reaction, observer, and the guard."""
+"""The controller, from measured state to torques: synthesis, drives, reaction, observer, guard."""
 
 from fulcrum.sim.control.controller import ForceController
 from fulcrum.sim.control.protocol import Controller

@@ -1,4 +1,4 @@
-"""The outer loop: from the measured state to the forces that the drives are to make."""
+"""The outer control loop: it synthesises the forces for the drives from the measured state."""
 
 from __future__ import annotations
 
@@ -26,14 +26,14 @@ from fulcrum.synthesis import (
 from fulcrum.synthesis.arrays import Array
 from fulcrum.synthesis.best_effort import BestEffort, best_effort
 
-# Time between looks at the run's health [s].
+# Time between checks of the run's health [s].
 _CHECK_S = 0.01
 
 
 class ForceController:
-    """Quasi-static force control along the path; the drives hold the last synthesised forces.
+    """Quasi-static force control along the path; the drives apply the last synthesised forces.
 
-    Implements :class:`sim.control.protocol.Controller`; :meth:`reset` comes before all else.
+    Implements :class:`sim.control.protocol.Controller`. Call :meth:`reset` first.
     """
 
     def __init__(
@@ -44,15 +44,15 @@ class ForceController:
         channel: Channel | None = None,
         best_effort: bool = False,
     ) -> None:
-        """Take over what is planned.
+        """Store settings and plan.
 
         Args:
-            control: The settings.
-            joint_path: What the drives follow.
-            grip: The least normal forces of the hands; the control's preload if left out.
-            channel: The wire to the drives; an ideal one if left out.
-            best_effort: Whether, where no forces balance the object, those nearest to balance are
-                applied, instead of the last that did.
+            control: Settings of the controller.
+            joint_path: Joint path that the drives follow.
+            grip: Least normal forces of the hands; by default the preload of the control.
+            channel: Connection to the drives; by default an ideal one.
+            best_effort: Whether to apply the forces nearest to balance where no forces balance the
+                object. Otherwise the last forces that balanced it stay.
         """
         self._control, self._joint_path, self._grip = control, joint_path, grip
         self._channel, self._best_effort = channel or Channel(NO_DEVIATION), best_effort
@@ -64,7 +64,7 @@ class ForceController:
         self._scenario, self._robot, self._path = scenario, robot, object_path(scenario.path)
         self._references = References(joint_path, timestep)
         self._free, self._held = schedule.free.tolist(), schedule.held.tolist()
-        # Once the grip has been let go for good there is nothing left to be lowered.
+        # After the last phase with full grip there is no object left to lower.
         self._last_held = max(schedule.held.nonzero()[0].tolist(), default=-1)
         self._statics = Statics(scenario, control, self._grip)
         self._synthesizer = Synthesizer()
@@ -74,9 +74,10 @@ class ForceController:
         self._supervisor = Supervisor(control.guard)
         self._health = Health(control.guard, scenario, robot, joint_path.start)
         self._tick, self._check_every = 0, max(1, round(_CHECK_S / timestep))
-        # The robots as of the last synthesis.
+        # State of the robots at the last synthesis.
         self._state = robot.at(joint_path.start)
-        # Since when no forces are found, and when a setpoint last arrived, or none was due [s].
+        # Time of the first synthesis without forces; last time at which a setpoint arrived, or
+        # none was due [s].
         self._failing_t: float | None = None
         self._heard_t = 0.0
         self._q_stop: Array | None = None
@@ -139,7 +140,7 @@ class ForceController:
         )
 
     def _receive(self, t: float, path_t: float) -> None:
-        """Follows a setpoint that has arrived; while lowering without, what held on the way up."""
+        """Follow a new setpoint; when lowering without one, use that of the way up."""
         setpoint, lowering = self._channel.receive(t), self._supervisor.mode is Mode.LOWER
         if setpoint is not None:
             self._heard_t = t
@@ -164,7 +165,7 @@ class ForceController:
         self._supervisor.update(seen.t, findings, path_t, lowerable)
 
     def _synthesize(self, seen: Measurement, target: Target) -> Solution | BestEffort | None:
-        """Sends the forces for a measured pose, if there are any."""
+        """Find the forces for a measured pose and send them to the drives."""
         pose = self._observer.update(seen.t, seen.p_WO, seen.quat_WO, target.tilt)
         problem = self._statics.problem(self._state, *pose, target.tilt)
         if self._control.inertia:
@@ -178,7 +179,7 @@ class ForceController:
         return forces
 
     def _moving(self, problem: Problem, target: Target) -> Problem:
-        """The problem in motion: what accelerates object and robot counts as load."""
+        """Return the problem with the inertial loads of object and robot added."""
         assert problem.joints is not None
         w_a, w_b = inertial_wrenches(self._scenario, self._path, target.tilt)
         w_ext_O = problem.w_ext_O - target.acceleration * w_a - target.rate**2 * w_b

@@ -1,18 +1,18 @@
-r"""The drives: joint impedance at the physics' rate along the path, and the forces last asked for.
+r"""The drives: joint impedance along the path at the physics rate, plus the forces of the setpoint.
 
 .. math:: \tau = g(q) + \left[ M \ddot q_d + C(q, \dot q_d) \dot q_d \right]
                  + s\,J^T f^* + D \dot q_d
                  + M(q) \left( \omega^2 (q_d - q) + 2 \omega (\dot q_d - \dot q) \right)
 
 with :math:`f^*` the forces of the last setpoint that has arrived, s the share of grip that the
-schedule asks for and D the joints' viscous friction; what is in brackets only where the control
-counts with inertia. The mass matrix M gives every joint, light or heavy, the same bandwidth
-:math:`\omega`: damping that is explicit in time stays stable on light wrists. A joint whose encoder
-is dead has no impedance. Whatever comes in, what goes out is finite and within the limits.
+schedule asks for and D the joints' viscous friction. The terms in brackets are used only if the
+control includes inertia. The mass matrix M gives every joint, light or heavy, the same bandwidth
+:math:`\omega`, so that damping explicit in time stays stable on light wrists. A joint with a dead
+encoder has no impedance. The torques are finite and within the limits for any input.
 
-A stiff impedance would also oppose the squeeze, by which the hands sink into what they hold. So
-that the force there is the one asked for, it leaves the squeeze to the feed-forward
-(:mod:`sim.control.squeeze`).
+A stiff impedance would also oppose the squeeze, by which the hands sink into the object. The
+impedance therefore leaves the squeeze to the feed-forward (:mod:`sim.control.squeeze`), so that the
+squeeze has the commanded force.
 """
 
 from __future__ import annotations
@@ -31,19 +31,25 @@ from fulcrum.synthesis.arrays import Array, Mask, N
 
 
 class Drives:
-    """Turns measured joint states into torques within the limits.
+    """The drives of all joints: torques within the limits from measured joint states.
 
     Attributes:
-        tau_g: Torques that hold the robot up, and where inertia counts also make its motion, as of
-            the last update of the model (l,).
-        tau: Torques that were last asked for, within the limits (l,).
-        saturated: Which of them were cut at their limit, (l,).
-        tau_pull: Torques with which the impedance last pulled the joints to their path (l,).
-        w_held: Wrenches on the object that the last torques were to make [N, N·m], (m, 6).
+        tau_g: Torques that carry the robot's weight, at the last update of the model [N·m or N],
+            (l,); with inertia, also those that accelerate it.
+        tau: Torques last commanded, within the limits [N·m or N], (l,).
+        saturated: Which torques were cut at their limit, (l,).
+        tau_pull: Torques of the impedance in the last step [N·m or N], (l,).
+        w_held: Wrenches on the object commanded by the last torques [N, N·m], (m, 6).
     """
 
     def __init__(self, scenario: Scenario, control: Control, robot: RobotModel) -> None:
-        """Take over the belief."""
+        """Start without contact forces.
+
+        Args:
+            scenario: Scenario as the controller believes it to be.
+            control: Settings of the controller.
+            robot: Model of the robots.
+        """
         self._robot, self._control = robot, control
         joints = len(robot.joints)
         self.tau_g, self.tau_pull, self.tau = np.zeros((3, joints))
@@ -56,21 +62,21 @@ class Drives:
             self.tau_g,
             self._setpoint.w_commanded_C,
         )
-        # Deviations of angles and speeds, and torques per each of them: both terms in one product.
+        # Deviations of angles and speeds, and their gains: one product gives both torque terms.
         self._deviations, self._gains = np.zeros(2 * joints), np.zeros((joints, 2 * joints))
         self._q_off, self._qd_off = self._deviations[:joints], self._deviations[joints:]
         self._reaction, self._extra = GripReaction(scenario, control, robot), 0.0
         self._update_s = control.solve_every * scenario.physics.timestep
-        # Setpoints by path time, in the order of both.
+        # Setpoints and their path times, both in ascending order of path time.
         self._times: list[float] = []
         self._memory: list[Setpoint] = []
 
     def update_model(self, robot: RobotState, target: Target | None = None) -> None:
-        """Take over a state of the robots, for gravity and gains until the next update.
+        """Set gravity torques and gains from a state of the robots, until the next update.
 
         Args:
-            robot: The state.
-            target: Whose motion is to be made, inertia and all; None where it does not count.
+            robot: State of the robots.
+            target: Motion whose inertial torques are added; None to leave them out.
         """
         omega, mass_matrix = self._control.bandwidth, robot.mass_matrix()
         share, pull, dt = self._share, self.tau_pull, self._update_s
@@ -78,7 +84,7 @@ class Drives:
             mass_matrix, self._setpoint, pull, self.tau_g, share, dt
         )
         stiffness, damping = self._reaction.braced(mass_matrix, omega)
-        # After bracing, which would scale what is left of the squeeze.
+        # After bracing, which would scale the remainder of the squeeze.
         if self._control.yielding_squeeze and share != 0.0:
             stiffness, damping = free_squeeze(mass_matrix, self._setpoint, stiffness, damping)
         joints = len(stiffness)
@@ -86,20 +92,20 @@ class Drives:
         self.tau_g = robot.tau_g
         if target is not None and target.qdd is not None:
             self.tau_g = self.tau_g + robot.motion_torques(target.qd, target.qdd)
-        self._share = math.nan  # what was held is to be found anew
+        self._share = math.nan  # forces the held torques to be computed again
 
     def follow(self, setpoint: Setpoint) -> None:
-        """Takes over a setpoint that has arrived."""
+        """Follow a setpoint that has arrived."""
         self._setpoint = setpoint
         self._share = math.nan
 
     def remember(self, path_t: float) -> None:
-        """Keeps the present setpoint as that of a path time [s] after all that are kept."""
+        """Store the present setpoint for a path time [s], later than those of all stored ones."""
         self._times.append(path_t)
         self._memory.append(self._setpoint)
 
     def recall(self, path_t: float) -> None:
-        """Takes over the setpoint that held at a path time [s], if any is kept."""
+        """Follow the stored setpoint that was valid at a path time [s], if any is stored."""
         if self._memory:
             setpoint = self._memory[max(0, bisect_right(self._times, path_t) - 1)]
             if setpoint is not self._setpoint:
@@ -108,12 +114,12 @@ class Drives:
     def torques(
         self, measurement: Measurement, target: Target, share: float, dead: Mask | None = None
     ) -> tuple[Array, Mask]:
-        """Torques [N·m or N], (l,), and which of them were cut at their limit.
+        """Return torques [N·m or N], (l,), and which of them were cut at their limit, (l,).
 
         Args:
-            measurement: The present state of the joints.
-            target: Where they should be.
-            share: Of the setpoint's forces that is applied [-].
+            measurement: Present state of the joints.
+            target: Reference of the joints.
+            share: Share of the setpoint's forces that is applied [-].
             dead: Joints without impedance, (l,); None if there are none.
         """
         np.subtract(target.q, measurement.q, self._q_off)
@@ -129,14 +135,14 @@ class Drives:
         robot = self._robot
         tau = pull + robot.damping * target.qd
         tau += self._tau_held
-        if math.isnan(tau.dot(tau)):  # a limit cuts infinities, but lets NaN pass
+        if math.isnan(tau.dot(tau)):  # clipping removes infinities, but not NaN
             tau = np.where(np.isnan(tau), self.tau, tau)
         self.tau = np.minimum(np.maximum(tau, robot.tau_min), robot.tau_max)
         self.saturated = self.tau != tau
         return self.tau, self.saturated
 
     def _hold(self, share: float) -> None:
-        """Finds what holds robot and object until the next setpoint or change of share."""
+        """Compute the torques that hold robot and object until setpoint or share change."""
         self._share = share
         self._tau_held = self.tau_g + share * self._setpoint.tau_f
         self.w_held = share * self._setpoint.w_commanded_C

@@ -1,4 +1,4 @@
-"""When a run is held, lowered or stopped, by a stated rule.
+"""The rule by which a run is held, lowered or stopped.
 
 =====================================  ==================================  =========================
 cause                                  while it lasts                      if it persists
@@ -15,12 +15,12 @@ the object is not where the hands are                                      stop,
 lowering is blocked                                                        stop
 =====================================  ==================================  =========================
 
-To hold is to let path time stand still; forces and impedance go on. To lower is to let it run
-backwards: the object goes down the way it came, the hands let go of it at the bottom and withdraw;
-where no new setpoint arrives the drives apply what held the object there on its way up. To stop
-is to hold for good; who lets go lets the contact forces fade. Once the hands have let go at the
-end of a manoeuvre nothing is left to be lowered, and what would lower stops.
-A run ends a second after it was stopped, or the hands have withdrawn.
+Hold: path time stands still; forces and impedance stay on. Lower: path time runs backwards. The
+object goes down the way it came; at the bottom the hands release it and withdraw. Where no new
+setpoint arrives, the drives apply the forces that held the object there on its way up. Stop: hold
+until the end. Let go: the contact forces fade to zero. After the hands have released the object at
+the end of a manoeuvre it cannot be lowered; the run stops instead.
+A run ends one second after it was stopped, or after the hands have withdrawn.
 """
 
 from __future__ import annotations
@@ -31,13 +31,13 @@ from collections.abc import Sequence
 from fulcrum.sim.scenario import Guard
 from fulcrum.sim.signals import Cause, Event, Finding, Mode, Reaction
 
-# What is left to be seen after the end: that everything rests [s].
+# Time recorded after the end, to see that everything is at rest [s].
 _AFTER_S = 1.0
-# How long all must be well before a held run goes on [s].
+# Time without findings before a held run goes on [s].
 _SETTLED_S = 0.2
-# How long an encoder may be gone: some ten of its samples [s].
+# Time for which an encoder may give no values: about ten of its samples [s].
 _ENCODER_S = 0.02
-# How long the forces take to fade where the hands let go [s].
+# Time in which the forces fade when the hands let go [s].
 _FADE_S = 0.3
 
 
@@ -50,12 +50,12 @@ _BLOCKING = (Cause.SATURATION, Cause.JOINT)
 
 
 class Supervisor:
-    """The state of a run between what is found and what is done about it.
+    """The guard's state machine: findings go in, the mode of the run comes out.
 
     Attributes:
-        mode: What the run is doing.
-        events: What has happened so far.
-        stands: Whether the arms are to hold where they were when this began, off the path.
+        mode: Present mode of the run.
+        events: Events so far.
+        stands: Whether the arms stay at the joint angles at which they were stopped, off the path.
     """
 
     def __init__(self, settings: Guard) -> None:
@@ -70,25 +70,25 @@ class Supervisor:
 
     @property
     def rate(self) -> float:
-        """Seconds of path per second that the mode asks for [-]."""
+        """Seconds of path time per second in the present mode [-]."""
         return RATES[self.mode]
 
     def grip(self, t: float) -> float:
-        """Share of the grip that is left at a time [s], 1 unless the hands let go [-]."""
+        """Return the share of the grip at a time [s]; 1 unless the hands let go [-]."""
         return max(0.0, min(1.0, 1.0 - (t - self._let_go_at) / _FADE_S))
 
     def left_s(self, t: float, path_t: float) -> float:
-        """How long a run that is lowered or stopped still takes, at a time and path time [s]."""
+        """Return the time to the end of a lowered or stopped run, by time and path time [s]."""
         return self._ends_at - t if math.isfinite(self._ends_at) else path_t + _AFTER_S
 
     def update(self, t: float, findings: Sequence[Finding], path_t: float, lowerable: bool) -> None:
-        """Takes over what is found at a time.
+        """Set the mode by the findings at a time.
 
         Args:
             t: Time [s].
-            findings: What is found now.
+            findings: Present findings.
             path_t: Path time [s].
-            lowerable: Whether the hands have not let go at the end of the manoeuvre.
+            lowerable: Whether the hands have not yet let go at the end of the manoeuvre.
         """
         if self.mode is Mode.RUN and not findings:
             return
@@ -112,7 +112,7 @@ class Supervisor:
         self._held_from = self._last_trouble = t
 
     def _wait(self, t: float, found: dict[Cause, str], lowerable: bool) -> None:
-        """Goes on once all has been well for a while, and lowers if that takes too long."""
+        """Go on after a while without findings; lower if that takes too long."""
         if found:
             self._last_trouble = t
         held_s = t - self._held_from
@@ -130,7 +130,7 @@ class Supervisor:
                 self._stop(t, *persists)
 
     def _lower(self, t: float, found: dict[Cause, str], path_t: float) -> None:
-        """Ends at the path's start; stops if a cause lasts that keeps the arms from following."""
+        """End at the start of the path; stop if something keeps the arms from following it."""
         for cause in _BLOCKING:
             since = max(self._since.get(cause, math.inf), self._lowered_from)
             if t - since >= self._settings.lower_s and not math.isfinite(self._ends_at):
@@ -144,7 +144,7 @@ class Supervisor:
     def _stop(self, t: float, cause: Cause, text: str) -> None:
         self._enter(Mode.STOP, t, cause, text)
         self._ends_at = t + _AFTER_S
-        # Arms that hold the object come to rest on the path; an abrupt stop would shake it off.
+        # Arms that hold the object come to rest on the path: an abrupt stop would shake it off.
         self.stands = cause is not Cause.ENCODER
         if cause in _LETTING_GO:
             self._let_go_at = t

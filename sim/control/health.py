@@ -1,4 +1,4 @@
-"""What is wrong with a run, from what the controller sees and does: the findings of the guard."""
+"""Checks of a run's health by measurements and commands; their findings go to the guard."""
 
 from __future__ import annotations
 
@@ -14,24 +14,24 @@ from fulcrum.sim.scenario import Guard, Scenario
 from fulcrum.sim.signals import Cause, Finding, Measurement, Target
 from fulcrum.synthesis.arrays import Array, Mask
 
-# No joint turns or moves that far, or that fast, unless its encoder is broken [rad, m, or per s].
+# Larger joint positions and speeds mean a broken encoder [rad or m, rad/s or m/s].
 _PLAUSIBLE = 1e3
-# A sensor that repeats its value to the last bit while its reference moves as far is frozen.
+# A sensor is frozen if it repeats its value to the last bit while its reference moves this far.
 _FROZEN_JOINT = 0.001  # [rad or m]
 _FROZEN_TILT = math.radians(0.3)
-# Pose noise of half a degree per sample is no tilt error: time constant of its filter [s].
+# Time constant of the filter of the tilt error [s]; pose noise may be half a degree per sample.
 _FILTER_S = 0.05
-# How long what is no matter of single samples must last [s].
+# Time that a symptom must last, so that single samples do not count [s].
 _LASTING_S = 0.02
 
 
 class Sent(NamedTuple):
-    """What the drives asked of the motors.
+    """The torques that the drives commanded.
 
     Attributes:
-        tau: Torques [N·m or N], (l,).
+        tau: Commanded torques [N·m or N], (l,).
         saturated: Which of them were cut at their limit, (l,).
-        pull: The part of the torques that pulls the joints to their path, (l,).
+        pull: Torques of the impedance [N·m or N], (l,).
     """
 
     tau: Array
@@ -40,16 +40,23 @@ class Sent(NamedTuple):
 
 
 class Health:
-    """Makes measurements usable, and tells what is wrong.
+    """The health checks of one run.
 
     Attributes:
-        dead: Joints whose encoders give nothing usable, (l,); None if all do.
+        dead: Joints whose encoders give no usable values, (l,); None if there are none.
     """
 
     def __init__(
         self, settings: Guard, scenario: Scenario, robot: RobotModel, start: Array
     ) -> None:
-        """Takes over thresholds, the belief, and the joints' start [rad or m], (l,)."""
+        """Start the checks.
+
+        Args:
+            settings: Thresholds.
+            scenario: Scenario as the controller believes it to be.
+            robot: Model of the robots.
+            start: Joint positions at the start [rad or m], (l,).
+        """
         self._settings, self._robot = settings, robot
         self._hands = tuple(hand.name for hand in scenario.hands)
         self._path = object_path(scenario.path)
@@ -69,13 +76,13 @@ class Health:
 
     @property
     def uncontrolled(self) -> Mask | None:
-        """Joints that cannot be kept on their path, by encoder or motor, (l,); None for none."""
+        """Joints without control, as encoder or motor is broken, (l,); None if there are none."""
         if self._broken is None or self.dead is None:
             return self.dead if self._broken is None else self._broken
         return self.dead | self._broken
 
     def accept(self, measurement: Measurement) -> Measurement:
-        """The measurement with the last usable value of every joint whose encoder gives none."""
+        """Return the measurement, with unusable joint values replaced by the last usable ones."""
         q, qd = measurement.q, measurement.qd
         if not q.dot(q) + qd.dot(qd) < _PLAUSIBLE**2:
             self._lost = lost = ~((np.abs(q) < _PLAUSIBLE) & (np.abs(qd) < _PLAUSIBLE))
@@ -89,7 +96,7 @@ class Health:
         return measurement
 
     def sees_object(self, measurement: Measurement) -> bool:
-        """Whether the object's pose is usable."""
+        """Return whether the object's pose is usable."""
         return not self._pose_frozen and _tracked(measurement)
 
     def check(
@@ -102,16 +109,16 @@ class Health:
         failing_s: float,
         silent_s: float,
     ) -> list[Finding]:
-        """What is wrong now, the gravest first.
+        """Return the present findings, the gravest first.
 
         Args:
-            measurement: An accepted measurement.
-            robot: The robots as of the last synthesis.
-            target: The references.
-            sent: What the drives last asked for.
+            measurement: Measurement returned by :meth:`accept`.
+            robot: State of the robots at the last synthesis.
+            target: References.
+            sent: Torques that the drives last commanded.
             held: Whether the object is held with full grip.
-            failing_s: For how long the synthesis has found no forces [s].
-            silent_s: For how long no setpoint has arrived where some were due [s].
+            failing_s: Time for which the synthesis has found no forces [s].
+            silent_s: Time for which no setpoint has arrived although some were due [s].
         """
         settings, t = self._settings, measurement.t
         found = self._encoders(measurement, target)
@@ -128,7 +135,7 @@ class Health:
 
     def _joints(self, measurement: Measurement, target: Target, sent: Sent) -> list[Finding]:
         settings, t, found = self._settings, measurement.t, []
-        # An arm whose weight alone is too much sags; what counts then is how far.
+        # Without grip an arm too heavy for its motors sags; then only the joint error is checked.
         cut = bool(np.count_nonzero(sent.saturated)) and target.grip > 0.0
         if self._lasts(Cause.SATURATION, t, cut) > settings.saturated_s:
             joint = self._robot.joints[int(np.argmax(sent.saturated))]
@@ -136,7 +143,7 @@ class Health:
         off = np.abs(target.q - measurement.q)
         worst = int(off.argmax())
         if off[worst] > settings.joint_error:
-            # A light wrist is not pulled hard, and off by much before it matters.
+            # The impedance of a light wrist is weak: its error counts only at a large torque.
             hard = np.abs(sent.pull) > settings.joint_pull * self._tau_limit
             off = np.where(hard, off, 0.0)
             worst = int(off.argmax())
@@ -146,7 +153,7 @@ class Health:
         return found
 
     def _lasts(self, cause: Cause, t: float, present: bool) -> float:
-        """For how long a symptom has been there [s]; 0 where it is not."""
+        """Return for how long a symptom has been present [s]; 0 if it is not."""
         if not present:
             self._since.pop(cause, None)
             return 0.0
@@ -155,7 +162,7 @@ class Health:
     def _encoders(self, measurement: Measurement, target: Target) -> list[Finding]:
         same = measurement.q == self._q_seen
         self._q_seen = measurement.q
-        if not np.count_nonzero(same):  # an eighth of the time that any() takes
+        if not np.count_nonzero(same):  # eight times as fast as any()
             self._q_moved = target.q
             if self._lost is None:
                 self.dead = None
@@ -188,7 +195,7 @@ class Health:
     def _object(
         self, measurement: Measurement, robot: RobotState, target: Target, held: bool
     ) -> list[Finding]:
-        """Whether the object is seen, is where the hands are, and has the tilt it should have."""
+        """Check that the object is seen, lies between the hands, and has the commanded tilt."""
         t, settings = measurement.t, self._settings
         pose = measurement.p_WO.tobytes() + measurement.quat_WO.tobytes()
         tracked = _tracked(measurement)
@@ -220,13 +227,13 @@ class Health:
         return found
 
     def _off_hands(self, measurement: Measurement, robot: RobotState) -> Array:
-        """Distances of the tips from where the object as seen would have them [m], (n,)."""
+        """Return the distances of the tips from their places on the measured object [m], (n,)."""
         R_WO = quaternion.matrix(measurement.quat_WO)
         off = self._p_OT_O.dot(R_WO.T) + measurement.p_WO - robot.tips()
         return np.sqrt(np.einsum("ni,ni->n", off, off))
 
 
 def _tracked(measurement: Measurement) -> bool:
-    """Whether the tracking of the object gives numbers that can be a pose."""
+    """Return whether the tracking of the object gives numbers that can be a pose."""
     p_WO, quat_WO = measurement.p_WO, measurement.quat_WO
     return bool(p_WO.dot(p_WO) < _PLAUSIBLE**2 and 0.0 < quat_WO.dot(quat_WO) < _PLAUSIBLE**2)

@@ -1,8 +1,8 @@
-r"""Where the object is: measurements, smoothed along the path that it is on.
+r"""An estimate of the object's pose: measurements, smoothed along the path.
 
-Between ticks the estimate is carried on as the path moves; then it goes a share
-:math:`\alpha = 1 - e^{-T / \tau}` of the way to the measurement, T after the last one. What is
-smoothed is the deviation from the path alone, so that the estimate does not lag behind the motion.
+The estimate moves with the path from one measurement to the next. It then goes a share
+:math:`\alpha = 1 - e^{-T / \tau}` of the way to the new measurement, with T the time between both.
+Only the deviation from the path is smoothed, so that the estimate does not lag behind the motion.
 """
 
 from __future__ import annotations
@@ -17,22 +17,27 @@ from fulcrum.synthesis.arrays import Array
 
 
 class PoseObserver:
-    """Smooths the measured pose with a time constant; with none it hands it on."""
+    """A first-order filter of the measured pose; a time constant of 0 turns it off."""
 
     def __init__(self, path: ObjectPath, time_constant: float) -> None:
-        """Takes the path, and the time constant [s]."""
+        """Start without an estimate.
+
+        Args:
+            path: Path of the object.
+            time_constant: Time constant of the filter [s].
+        """
         self._path, self._tau = path, time_constant
         self._t, self._tilt = math.nan, 0.0
         self._p_WO, self._quat_WO = np.zeros(3), np.zeros(4)
 
     def update(self, t: float, p_WO: Array, quat_WO: Array, tilt_ref: float) -> tuple[Array, Array]:
-        """The estimate of position, (3,), and orientation, (4,).
+        """Return the estimate of position [m], (3,), and orientation, (4,), wxyz.
 
         Args:
             t: Time of the measurement [s].
             p_WO: Measured position [m], (3,).
             quat_WO: Measured orientation, (4,), wxyz.
-            tilt_ref: Where the path's motion is to be [rad].
+            tilt_ref: Commanded tilt [rad].
         """
         if self._tau == 0.0:
             return p_WO, quat_WO
@@ -44,7 +49,7 @@ class PoseObserver:
                 self._tilt, tilt_ref, self._p_WO, self._quat_WO
             )
             self._p_WO = self._p_WO + share * (p_WO - self._p_WO)
-            # In the object's axes.
+            # Rotation vector in the object's axes.
             turn = quaternion.difference(quat_WO, self._quat_WO)
             self._quat_WO = quaternion.turned(self._quat_WO, turn, share)
         self._t, self._tilt = t, tilt_ref

@@ -1,4 +1,4 @@
-"""What a controller is to the loop."""
+"""The interface between a controller and the loop."""
 
 from __future__ import annotations
 
@@ -10,23 +10,23 @@ from fulcrum.sim.signals import Command, Event, Measurement
 
 
 class Controller(Protocol):
-    """Turns measurements into torques, one run at a time."""
+    """A controller: torques from measurements, one run at a time."""
 
     @property
     def events(self) -> tuple[Event, ...]:
-        """What went wrong since the reset, and what was done about it."""
+        """What went wrong since the reset, and the reactions to it."""
 
     def reset(self, scenario: Scenario, robot: RobotModel, seed: int) -> None:
         """Begin a run.
 
         Args:
-            scenario: What the controller believes.
-            robot: Its model of the robots.
-            seed: Of whatever is random in the controller.
+            scenario: Scenario as the controller believes it to be.
+            robot: Model of the robots.
+            seed: Seed of the controller's random numbers.
         """
 
     def command(self, measurement: Measurement) -> Command:
         """Return the torques of the next step; called once per physics step."""
 
     def left_s(self, t: float) -> float:
-        """Return how long the run still takes as things stand at a time [s]; 0 at its end."""
+        """Return the expected time to the end of the run at a time [s]; 0 at the end."""

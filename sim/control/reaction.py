@@ -1,14 +1,15 @@
-r"""Presses harder, and stiffens, as soon as the impedance holds what the synthesis did not expect.
+r"""The reaction of the hands to loads that the synthesis did not expect: more grip, more stiffness.
 
-The impedance's torques :math:`\tau_p` mean contact wrenches of the hands, here by least squares,
-weighted like kinetic energy:
+Such loads show as torques :math:`\tau_p` of the impedance. The contact wrenches of the hands that
+belong to them follow by least squares, weighted by the mass matrix as kinetic energy is:
 
 .. math:: f_p = (J M^{-1} J^T)^{-1} J M^{-1} \tau_p
 
-With them on top of those of the synthesis each hand needs the normal force that puts it on the
-friction cone (2) of the paper; if that is near to what there is, all hands press harder along the
-squeeze that moves nothing, the null vector of the normal forces' grasp map, and the arms brace: all
-joints become stiffer, and light ones, by which the object would swing about the hands, much more.
+Added to the synthesised wrenches, they give the normal force that each hand needs by the friction
+cone (2) of the paper. If that is near to the present normal force, all hands press harder along the
+squeeze, which is the null vector of the grasp map of the normal forces and does not move the
+object. The arms also brace: all joints become stiffer. Light joints become much stiffer, as the
+object could swing about the hands by them.
 """
 
 from __future__ import annotations
@@ -24,26 +25,27 @@ from fulcrum.sim.signals import Setpoint
 from fulcrum.synthesis.arrays import Array, N
 from fulcrum.synthesis.contact import ContactSet
 
-# Share of the normal force that may be needed before the hands press harder [-].
+# Share of the normal force that may be needed for friction before the hands press harder [-].
 _NEEDED = 0.78
-# Share of the torque limits that pressing harder may use [-].
+# Share of the torque limits up to which the hands may press harder [-].
 _TORQUE = 0.88
-# How much stiffer joints are that brace; light ones have less than a share of the largest inertia.
+# Factors on the bandwidth of bracing joints and of light ones [-]; light joints have less than the
+# last number times the largest inertia [-].
 _BRACED, _BRACED_LIGHT, _LIGHT = 4.0 / 3.0, 8.0 / 3.0, 0.1
-# Less than this is let be [N].
+# Smallest additional normal force that is applied [N].
 _LEAST = 0.5
-# How slowly the hands ease off again [s].
+# Time constant with which the additional force decays [s].
 _EASE_S = 0.5
 # Singular values below this share of the largest are zero.
 _SINGULAR = 1e-6
 
 
 class GripReaction:
-    """How much harder than the setpoint the hands press.
+    """The normal force that the hands add to the setpoint.
 
     Attributes:
-        direction: Normal forces that add up to nothing, the largest 1, (n,); zeros where the hands
-            cannot squeeze.
+        direction: Normal forces of the hands that cancel each other, the largest 1 [-], (n,);
+            zeros if the hands cannot squeeze.
     """
 
     def __init__(self, scenario: Scenario, control: Control, robot: RobotModel) -> None:
@@ -51,7 +53,7 @@ class GripReaction:
         self.direction = _squeeze(scenario)
         robustness = control.robustness
         self._most = robustness.reaction if robustness and self.direction.any() else 0.0
-        # Per newton of each component, the normal force that the lowest friction needs.
+        # Normal force needed per unit of each wrench component at the lowest friction.
         lowest = robustness.uncertainty.friction if robustness else 0.0
         hands = ContactSet.of(contacts(scenario, control)).friction[: len(scenario.hands)]
         self._needs = hands * control.friction_factor / (1.0 - lowest) / _NEEDED
@@ -66,15 +68,15 @@ class GripReaction:
         share: float,
         dt: float,
     ) -> float:
-        """The normal force to add along the direction [N].
+        """Return the normal force to add along the direction [N].
 
         Args:
-            mass_matrix: Of the joints, (l, l).
-            setpoint: What the drives make.
+            mass_matrix: Mass matrix of the joints, (l, l).
+            setpoint: Setpoint that the drives follow.
             pull: Torques of the impedance [N·m or N], (l,).
-            tau_g: Torques that hold the robot up [N·m or N], (l,).
-            share: Of the setpoint's forces that is applied [-]; below 1 the hands come or go, and
-                what they make is their own affair.
+            tau_g: Torques that carry the robot's weight [N·m or N], (l,).
+            share: Share of the setpoint's forces that is applied [-]. Below 1 the hands are
+                approaching or withdrawing; no reaction is computed.
             dt: Time since the last update [s].
         """
         if self._most == 0.0 or not share >= 1.0 or not setpoint.w_commanded_C.any():
@@ -84,7 +86,7 @@ class GripReaction:
         J = setpoint.J_C.reshape(6 * hands, -1)
         weighted = np.linalg.solve(mass_matrix, J.T)
         compliance = J @ weighted
-        # Hands that share joints cannot make all wrenches: a trace of damping picks the smallest.
+        # Hands that share joints cannot make all wrenches: slight damping selects the smallest.
         compliance.flat[:: 6 * hands + 1] *= 1.0 + _SINGULAR
         f_p = np.linalg.solve(compliance, weighted.T @ pull).reshape(hands, 6)
         w_C = share * setpoint.w_commanded_C[:hands] + f_p
@@ -97,11 +99,11 @@ class GripReaction:
         return self._extra
 
     def braced(self, mass_matrix: Array, omega: float) -> tuple[Array, Array]:
-        """Stiffness and damping per unit of deviation, (l, l), of joints that brace.
+        """Return stiffness and damping of the joints, (l, l) each, braced if the hands react.
 
         Args:
-            mass_matrix: What the impedance is scaled by, (l, l).
-            omega: Bandwidth of joints that don't [rad/s].
+            mass_matrix: Mass matrix that scales the impedance, (l, l).
+            omega: Bandwidth of joints that do not brace [rad/s].
         """
         if self._extra == 0.0:
             return omega**2 * mass_matrix, 2.0 * omega * mass_matrix
@@ -113,7 +115,13 @@ class GripReaction:
         return stiffness, 2.0 * root[:, None] * mass_matrix * root
 
     def _room(self, setpoint: Setpoint, tau: Array, share: float) -> float:
-        """How much the torques, those without the setpoint's given, leave for it [N]."""
+        """Return the normal force that the torque limits still allow along the direction [N].
+
+        Args:
+            setpoint: Setpoint that the drives follow.
+            tau: Torques without those of the setpoint [N·m or N], (l,).
+            share: Share of the setpoint's forces that is applied [-].
+        """
         per_newton = self.direction @ setpoint.J_C[:, N]
         tau = tau + share * setpoint.tau_f
         limit = np.where(per_newton > 0.0, self._robot.tau_max, self._robot.tau_min)
@@ -123,7 +131,7 @@ class GripReaction:
 
 
 def _squeeze(scenario: Scenario) -> Array:
-    """Normal forces of the hands whose wrenches cancel, all >= 0, (n,); zeros if there are none."""
+    """Return positive normal forces of the hands that cancel, (n,); zeros if there are none."""
     frames = ContactFrames(scenario)
     hands = len(scenario.hands)
     normals = frames.in_object(np.eye(3))[:hands, :, N]

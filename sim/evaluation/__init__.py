@@ -1,4 +1,4 @@
-"""What a run did and what it is worth: contact monitor, judge, report."""
+"""The evaluation of a run: contact monitor, judge, report."""
 
 from fulcrum.sim.evaluation.checks import Checks
 from fulcrum.sim.evaluation.failure import Category

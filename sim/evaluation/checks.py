@@ -1,4 +1,4 @@
-"""The checks of a run: its tolerances against trace and contact history."""
+"""The checks of a run: trace and contact history are compared with the tolerances."""
 
 from __future__ import annotations
 
@@ -15,17 +15,17 @@ from fulcrum.sim.scenario import Judged, Scenario
 from fulcrum.sim.signals import Event, Reaction, Trace, stretches
 from fulcrum.synthesis.arrays import Array, Mask, N
 
-# Reactions after which a manoeuvre is not completed.
+# Reactions that give up the manoeuvre.
 _GIVEN_UP = {Reaction.LOWER: "broken off and the object lowered", Reaction.STOP: "stopped"}
 
 
 def rms(values: Array) -> float:
-    """Return the root mean square, 0 of no values."""
+    """Return the root mean square; 0 if there are no values."""
     return float(np.sqrt(np.mean(np.square(values)))) if values.size else 0.0
 
 
 class Checks:
-    """One set of checks for all runs; what differs between runs is how much is tolerated."""
+    """The checks of a run; they are the same for all runs, only the tolerances differ."""
 
     def __init__(
         self,
@@ -47,7 +47,7 @@ class Checks:
         tilt: TiltReport,
         contacts: dict[str, ContactReport],
     ) -> tuple[Failure, ...]:
-        """Return every tolerance that was not kept, in order of time: the first is the cause."""
+        """Return every tolerance that was not kept, in order of time; the first is the cause."""
         phase = trace.phase.astype(int)
         held, free = self._schedule.held[phase], self._schedule.free[phase]
         found = []
@@ -66,14 +66,14 @@ class Checks:
             found += _no_forces(trace)
         if self._limits.given_up:
             found += [_gave_up(event) for event in info.events if event.reaction in _GIVEN_UP]
-        # What ended the run is why the tilt was not reached, and stands before it.
+        # An error explains why the tilt was not reached; so it comes before the tilt.
         if info.error is not None:
             found.append(Failure(float(trace.t[-1]), Category.ERROR, "", info.error))
         found += self._end(tilt, trace)
         return tuple(sorted(found, key=lambda failure: failure.t))
 
     def lost(self, i: int, history: ContactHistory, held: Mask) -> Mask:
-        """Return the steps at which a contact counts as lost while it should hold, (k,)."""
+        """Return which steps count as lost contact while the contact should hold, (k,)."""
         limits, hand = self._limits, i < len(self._scenario.hands)
         lost_s = limits.lost_s if hand else _given(limits.support_lost_s, limits.lost_s)
         return self._stretches(held & ~history.kept[:, i], lost_s)
@@ -89,14 +89,14 @@ class Checks:
         limits, failures = self._limits, []
         name, hand = self._scenario.contact_names[i], i < len(self._scenario.hands)
         lost = self.lost(i, history, held_rows)
-        # What a contact does once it has let go is no news.
+        # After its loss a contact is not judged any more.
         held = held_rows & ~np.logical_or.accumulate(lost)
         if lost.any():
             off = np.count_nonzero(held_rows & ~history.kept[:, i])
             count = f"{off} of {np.count_nonzero(held_rows)}"
             text = f"Contact {name} let go at {{when}}; it was lost in {count} steps."
             failures.append(_failure(trace, lost, Category.LOST, name, text))
-        # Not "more than": what is no number is no success.
+        # Negated so that NaN fails, too.
         slip_mm = limits.slip_mm if hand else _given(limits.support_slip_mm, limits.slip_mm)
         slip = held & ~(1e3 * history.slip[:, i] <= slip_mm)
         slide_mm = _given(limits.slide_mm, limits.slip_mm)
@@ -119,7 +119,7 @@ class Checks:
             text = f"Contact {name} spun more than the allowed {limits.spin_deg:g} deg at {{when}}."
             failures.append(_failure(trace, spin, Category.SPIN, name, text))
         if any(i in place for place in self._shared):
-            return failures  # what is left is judged for the place as a whole
+            return failures  # the other checks are made for the place as a whole
         used = held & (history.utilisation[:, i] > limits.utilisation)
         if used.any() and not any(i in hands for hands in self._coupled):
             text = (
@@ -141,9 +141,10 @@ class Checks:
     def _place(
         self, place: tuple[int, ...], trace: Trace, history: ContactHistory, held: Mask
     ) -> list[Failure]:
-        """The force of supports that hold the same point; how they share it is indeterminate.
+        """Check the total force of supports that hold the same point.
 
-        So is how much of its friction one of them uses; whether it sticks is what slip says.
+        How they share it is indeterminate, and so is the utilisation of the friction of each.
+        Whether a support sticks is judged by its slip.
         """
         here = np.ix_(held, np.array(place))
         if not held.any() or not history.kept[here].all():
@@ -167,7 +168,7 @@ class Checks:
     def _together(
         self, hands: tuple[int, ...], trace: Trace, history: ContactHistory, held: Mask
     ) -> list[Failure]:
-        """The friction of hands that share a load as it happens to fall: what all of them use."""
+        """Check the friction used by several hands whose shares of a load are indeterminate."""
         chosen = np.array(hands)
         mu = np.array([self._scenario.hands[i].friction.mu for i in hands])
         can = mu * np.maximum(history.w_measured_C[:, chosen, N], 0.0)
@@ -184,7 +185,7 @@ class Checks:
         return [_failure(trace, used, Category.FRICTION, names, text)]
 
     def _hands(self, trace: Trace, history: ContactHistory, free: Mask) -> list[Failure]:
-        """Impacts while hands come and go, and hands that touch an object that stands alone."""
+        """Check for impacts of free hands, and for hands that touch an object that stands alone."""
         failures = []
         last = self._schedule.phases[-1]
         alone = (trace.phase == len(self._schedule.phases) - 1) & (last.gap > 0.0)
@@ -246,13 +247,13 @@ class Checks:
         return [_failure(trace, cut, Category.SATURATED, joint, text)]
 
     def _longer(self, flags: Mask, allowed_s: float) -> Mask:
-        """Where a flag has been set at a stretch for longer than allowed [s]."""
+        """Return where a flag has been set without a break for longer than allowed [s], (k,)."""
         if math.isinf(allowed_s):
             return np.zeros(len(flags), bool)
         return stretches(flags) > round(allowed_s / self._scenario.physics.timestep)
 
     def _stretches(self, flags: Mask, allowed_s: float) -> Mask:
-        """All of the stretches in which a flag has been set for longer than allowed [s]."""
+        """Return all steps of the stretches in which a flag is set for longer than allowed [s]."""
         if math.isinf(allowed_s):
             return np.zeros(len(flags), bool)
         length = stretches(flags) + stretches(flags[::-1])[::-1] - 1
@@ -284,7 +285,7 @@ def _gave_up(event: Event) -> Failure:
 
 
 def _failure(trace: Trace, mask: Mask, category: Category, subject: str, text: str) -> Failure:
-    """A failure at the first row of a mask; ``{when}`` in its text becomes time and tilt."""
+    """Return a failure at the first row of a mask; ``{when}`` in its text becomes time and tilt."""
     first = int(np.argmax(mask))
     when = f"{trace.t[first]:.2f} s (tilt {abs(np.degrees(trace.tilt[first])):.1f} deg)"
     return Failure(float(trace.t[first]), category, subject, text.replace("{when}", when))

@@ -1,4 +1,4 @@
-"""What a run did not keep to: when, in which respect, where, and in words."""
+"""Failures of a run: time, category, subject and text."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from enum import StrEnum
 
 
 class Category(StrEnum):
-    """In which respect a run failed."""
+    """The kind of a failure."""
 
     LOST = "lost"
     SLIP = "slip"
@@ -33,8 +33,8 @@ class Failure:
     """A tolerance that was not kept.
 
     Attributes:
-        t: When first [s].
-        category: In which respect.
+        t: Time at which it began [s].
+        category: Kind of failure.
         subject: Contact, joint or pair of geoms; empty for the run as a whole.
         text: The failure as a sentence.
     """
@@ -46,5 +46,5 @@ class Failure:
 
     @property
     def cause(self) -> str:
-        """Category and subject, for counting: ``slip left``."""
+        """Category and subject, by which failures are counted: ``slip left``."""
         return f"{self.category} {self.subject}".strip()

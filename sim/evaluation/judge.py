@@ -1,4 +1,4 @@
-"""The verdict of a run, with its outcome and the figures that both rest on."""
+"""The judge: verdict and outcome of a run, with the measurements that they depend on."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ from fulcrum.synthesis.arrays import Array, Mask, N
 
 
 class Judge:
-    """Judges runs of a scenario, by its tolerances or by those for disturbed runs."""
+    """The judge of a scenario's runs, by its tolerances or by those for disturbed runs."""
 
     def __init__(
         self,
@@ -37,15 +37,15 @@ class Judge:
         disturbed: bool = False,
         coupled: tuple[tuple[int, ...], ...] = (),
     ) -> None:
-        """Takes the plant's truth, joint names and torque limits, (l,).
+        """Choose the tolerances.
 
         Args:
-            scenario: The plant's truth.
+            scenario: True scenario, as the plant has it.
             joints: Names of the driven joints.
-            tau_min: Their least torques [N·m or N], (l,).
-            tau_max: Their largest torques [N·m or N], (l,).
-            disturbed: Whether the world of the runs may differ from what is believed, so that the
-                scenario's tolerances for that count.
+            tau_min: Least torques of the joints [N·m or N], (l,).
+            tau_max: Largest torques of the joints [N·m or N], (l,).
+            disturbed: Whether to use the tolerances for disturbed runs, as the world of the runs
+                may differ from the controller's model.
             coupled: Hands that share a load across; see :func:`sim.model.coupling.coupled_hands`.
         """
         self._scenario, self._joints, self._disturbed = scenario, joints, disturbed

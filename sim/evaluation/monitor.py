@@ -1,4 +1,4 @@
-"""The contact monitor: what the plant's contacts did, from its contact data alone."""
+"""The contact monitor: slip, spin and forces of the contacts, from the plant's contact data."""
 
 from __future__ import annotations
 
@@ -23,11 +23,11 @@ class ContactHistory:
         R_WC: Contact axes in the world, (k, m, 3, 3).
         w_measured_C: Measured wrenches on the object in contact axes [N, N·m], (k, m, 6).
         kept: Whether there was a normal force, (k, m).
-        slip: Tangential drift of the material points that touched when grip was built up [m], (k,
-            m); 0 while not held.
-        slide: Integral of the tangential speed at the contact since then [m].
-        spin: Integral of the angular velocity about the contact normal since then [rad].
-        utilisation: Of the true friction [-].
+        slip: Tangential distance between the material points that touched when full grip was
+            reached [m], (k, m); 0 while the object is not held.
+        slide: Integral of the tangential speed at the contact since then [m], (k, m).
+        spin: Integral of the angular velocity about the contact normal since then [rad], (k, m).
+        utilisation: Share of the true friction that is used [-], (k, m).
     """
 
     R_WC: Array
@@ -40,7 +40,7 @@ class ContactHistory:
 
     @staticmethod
     def concatenate(parts: list[ContactHistory]) -> ContactHistory:
-        """The history of consecutive blocks as one; at least one block."""
+        """Return the history of consecutive blocks, at least one, as one history."""
         names = [field.name for field in fields(ContactHistory)]
         return ContactHistory(**{n: np.concatenate([getattr(p, n) for p in parts]) for n in names})
 
@@ -50,9 +50,10 @@ class ContactHistory:
 
 
 class Monitor:
-    """Follows the contacts block by block; material points are marked when grip is built up.
+    """The monitor of a run's contacts; it is updated block by block.
 
-    Drift counts while the object is held with full grip: before and after, hands may come and go.
+    It marks the material points that touch when full grip is reached. Slip, slide and spin are
+    measured only while the object is held with full grip.
     """
 
     def __init__(self, scenario: Scenario) -> None:
@@ -66,7 +67,7 @@ class Monitor:
         self._spin = np.zeros(len(self._contacts))
 
     def update(self, block: Trace) -> ContactHistory:
-        """Contact quantities of the next rows of the run."""
+        """Return the contact quantities of the next rows of the run."""
         R_WO = rotations(block.quat_WO)
         R_WC = self._frames.in_world(R_WO)
         w_measured_C = np.zeros((len(block), len(self._contacts), 6))
@@ -87,7 +88,7 @@ class Monitor:
         )
 
     def _slips(self, block: Trace, R_WO: Array, normal: Array, held: Mask) -> Array:
-        """Distance of the two material points of each contact in its tangent plane."""
+        """Return the tangential distance of the material points of each contact [m], (k, m)."""
         slip = np.zeros(block.p_WC.shape[:2])
         if not held.any():
             return slip
@@ -108,7 +109,7 @@ class Monitor:
         return slip
 
     def _integrals(self, block: Trace, normal: Array, held: Mask) -> tuple[Array, Array]:
-        """Integrals of tangential speed and of spin about the normal, of object against other."""
+        """Return slide [m] and spin [rad] of the object relative to the other body, (k, m) each."""
         n, linear, angular = self._hands, slice(0, 3), slice(3, 6)
         turn_O = np.broadcast_to(block.twist_WO[:, None, angular], block.p_WC.shape)
         lever_O = block.p_WC - block.p_WO[:, None]

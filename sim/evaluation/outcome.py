@@ -1,17 +1,18 @@
 r"""The outcome of a run, measured from the motion of the object alone.
 
-Speeds and distances of the object are those of its mass, :math:`v^2 = 2 T / m` with the kinetic
-energy T (root mean squares), so that turning counts as far as it moves mass. The bounds:
+Speeds and distances of the object are root mean squares over its mass, :math:`v^2 = 2 T / m` with
+the kinetic energy T, so that they include rotation. The bounds:
 
-- An object *falls* if it moves faster than 0.15 m/s away from the commanded motion, and also in
-  the world: that is free fall from 1.1 mm. In runs of three scenes by all controllers in worlds of
-  all presets, with faults and planned tilts, objects that stayed in the hands or on their support
-  were at most 0.07 m/s fast, and those that came down on their own at least 0.21 m/s.
-- It is *at rest* if its mean speed over the last 0.1 s is below 20 mm/s. The last stretch of a run
-  asks for rest; held objects moved by 1.2 mm/s at most.
-- It is *at a pose* if its mass is off by no more than a fifth of its radius of gyration (some 20 mm
-  of a crate 0.3 m long), and its tilt differs by no more than a disturbed run may be off at the
-  end. Objects that were set down or lowered were off by 0.09 radii at most.
+- An object *falls* if it moves faster than 0.15 m/s, both relative to the commanded motion and in
+  the world. Free fall from 1.1 mm reaches this speed. In runs of three scenes by all controllers in
+  worlds of all presets, with faults and planned tilts, objects that stayed in the hands or on their
+  support moved with at most 0.07 m/s, and those that fell with at least 0.21 m/s.
+- It is *at rest* if its mean speed over the last 0.1 s is below 20 mm/s. At the end of a run the
+  object should rest; held objects moved with at most 1.2 mm/s.
+- It is *at a pose* if the distance of its mass to that pose is at most a fifth of its radius of
+  gyration (about 20 mm for a crate 0.3 m long), and the difference of the tilts is at most the
+  tolerance for disturbed runs. Objects that were set down or lowered were off by at most 0.09
+  radii.
 """
 
 from __future__ import annotations
@@ -32,19 +33,19 @@ from fulcrum.synthesis.arrays import Array
 _FALLING = 0.15
 # Speed of an object at rest [m/s], and the time over which it is averaged [s].
 _REST, _REST_S = 0.02, 0.1
-# How far the mass may be off, as a share of the radius of gyration [-].
+# Allowed distance of the mass, as a share of the radius of gyration [-].
 _OFF = 0.2
-# Time between the looks at the object's speed [s]; in it free fall gains 0.1 m/s.
+# Time between checks of the object's speed [s]; free fall gains 0.1 m/s in this time.
 _LOOK_S = 0.01
 
 
 class Outcome(StrEnum):
-    """What became of the object.
+    """The final state of the object.
 
-    ``completed``: it rests at the end of the manoeuvre. ``returned``: it rests on the path at
-    another tilt, and has not fallen: brought down or held there, or never moved. ``dropped``: it
-    fell, toppled, slid away or was let go. ``refused``: nothing has moved. ``interrupted``,
-    ``diverged``: the run ended before.
+    ``completed``: it rests at the end of the manoeuvre. ``returned``: it has not fallen and rests
+    on the path at another tilt, where it was lowered or held, or it never moved. ``dropped``: it
+    fell, toppled, slid away or was let go. ``refused``: the run was not begun; nothing has moved.
+    ``interrupted``, ``diverged``: the run ended early.
     """
 
     COMPLETED = "completed"
@@ -56,11 +57,11 @@ class Outcome(StrEnum):
 
 
 def measured_outcome(scenario: Scenario, trace: Trace) -> Outcome:
-    """Return what became of the object in a run that went on to its end.
+    """Return the final state of the object in a run that was not cut short.
 
     Args:
-        scenario: The plant's truth.
-        trace: The run, of at least one step.
+        scenario: True scenario, as the plant has it.
+        trace: Trace of the run, at least one step.
     """
     path, thing = object_path(scenario.path), scenario.object
     if fall_speed(path, thing, trace, scenario.physics.timestep) > _FALLING:
@@ -74,7 +75,7 @@ def measured_outcome(scenario: Scenario, trace: Trace) -> Outcome:
         return Outcome.DROPPED
     target = math.radians(scenario.path.angle_deg) * scenario.phases[-1].tilt
     near = math.degrees(abs(tilt - target)) <= scenario.tolerances.disturbed.final_deg
-    # Near the path's ends the measured tilt may lie beyond.
+    # The measured tilt may lie beyond the ends of the path.
     on_path = target if near else min(max(tilt, 0.0), path.end)
     if distance_off(scenario, trace, on_path) > _OFF * gyration(thing):
         return Outcome.DROPPED
@@ -89,8 +90,8 @@ def gyration(thing: Object) -> float:
 def fall_speed(path: ObjectPath, thing: Object, trace: Trace, timestep: float) -> float:
     """Return the largest speed of the object's mass away from the commanded motion [m/s].
 
-    An object that rests while the arms move on does not fall: where it is slower in the world
-    than against the commanded motion, that is what counts.
+    An object that rests while the arms move on does not fall: the smaller one of the speed relative
+    to the commanded motion and the speed in the world counts.
     """
     looks = trace.pick(np.arange(0, len(trace), max(1, round(_LOOK_S / timestep))))
     center = np.asarray(thing.center_of_mass)
@@ -105,28 +106,28 @@ def fall_speed(path: ObjectPath, thing: Object, trace: Trace, timestep: float) -
 
 
 def _of_center(thing: Object, quat_WO: Array, twist_WO: Array) -> Array:
-    """Twists of the centre of mass, (k, 6), from those of the object's frame, in world axes."""
+    """Return twists of the centre of mass from those of the object's frame, (k, 6), world axes."""
     moved = twist_WO.copy()
     moved[:, :3] += np.cross(twist_WO[:, 3:], rotations(quat_WO) @ np.asarray(thing.center_of_mass))
     return moved
 
 
 def _speeds(thing: Object, quat_WO: Array, twist: Array) -> Array:
-    """Speeds of the mass [m/s], (k,), from twists of its centre, (k, 6)."""
+    """Return speeds of the mass [m/s], (k,), from twists of the centre of mass, (k, 6)."""
     spin_O = np.einsum("kji,kj->ki", rotations(quat_WO), twist[:, 3:])
     turning = np.einsum("ki,ij,kj->k", spin_O, thing.inertia_O, spin_O) / thing.mass
     return np.sqrt(np.sum(twist[:, :3] ** 2, axis=1) + turning)
 
 
 def distance_off(scenario: Scenario, trace: Trace, tilt: float) -> float:
-    """Return how far the mass is off the path's pose at a tilt [rad], at the end of a run [m]."""
+    """Return the final distance of the object's mass to the path's pose at a tilt [rad] [m]."""
     thing = scenario.object
     R_WO, p_WO = object_path(scenario.path).pose(tilt)
     (R_end,) = rotations(trace.quat_WO[-1:])
     center = np.asarray(thing.center_of_mass)
     off = trace.p_WO[-1] + R_end @ center - p_WO - R_WO @ center
-    # Moved by a turn D, mass points are off by (D - 1) r; their mean square is 2 tr((1 - D) S),
-    # with the second moments S of the mass.
+    # A rotation D moves mass points by (D - 1) r; the mean square is 2 tr((1 - D) S), with the
+    # second moments S of the mass.
     inertia = thing.inertia_O / thing.mass
     moments = 0.5 * np.trace(inertia) * np.eye(3) - inertia
     turned = 2.0 * float(np.trace((np.eye(3) - R_WO.T @ R_end) @ moments))

@@ -1,4 +1,4 @@
-"""Results of a run: verdict, outcome, failures, and the measurements behind them."""
+"""The report of a run: verdict, outcome, failures and measurements."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ from fulcrum.synthesis.render import (
 
 
 class Verdict(StrEnum):
-    """Judgement of a run."""
+    """The judgement of a run."""
 
     PASS = "pass"
     FAIL = "fail"
@@ -44,7 +44,7 @@ _MARKS = {
 
 @dataclass(frozen=True)
 class PhaseReport:
-    """A part of the run in one phase: its name, start and end [s]."""
+    """One phase of the run: its name, start and end [s]."""
 
     name: str
     start_s: float
@@ -53,7 +53,7 @@ class PhaseReport:
 
 @dataclass(frozen=True)
 class TiltReport:
-    """Target, final value and errors of the tilt [deg]; final position error [mm]."""
+    """The tilt: target, final value and errors [deg], and the final position error [mm]."""
 
     target_deg: float
     final_deg: float
@@ -64,10 +64,10 @@ class TiltReport:
 
 @dataclass(frozen=True)
 class ContactReport:
-    """Measurements of one contact while the object was held with full grip.
+    """The measurements of one contact while the object was held with full grip.
 
     Slip, slide, spin and utilisation are measured until the contact is lost for the first time.
-    ``free_normal_n`` is the largest normal force while no grip was commanded: a hand's impact.
+    ``free_normal_n`` is the largest normal force while no grip was commanded, as at an impact.
     ``longest_gap_ms`` is the longest time without a normal force.
     """
 
@@ -83,13 +83,13 @@ class ContactReport:
 
     @property
     def kept_percent(self) -> float:
-        """Share of the steps with contact [%], rounded down to a decimal, so that 100 means all."""
+        """Share of the steps with contact [%], rounded down to 0.1, so that 100 means all."""
         return math.floor(1e3 * self.kept_fraction) / 10.0
 
 
 @dataclass(frozen=True)
 class TorqueReport:
-    """Largest share of a torque limit used, its joint, and share of steps with a torque cut."""
+    """The torques: largest used share of a limit, its joint, and share of steps with a cut [-]."""
 
     max_utilisation: float
     joint: str
@@ -98,7 +98,7 @@ class TorqueReport:
 
 @dataclass(frozen=True)
 class SynthesisReport:
-    """Number of syntheses and of failed ones, and their wall time with assembly and unpacking."""
+    """The syntheses: number, failures, and wall time with assembly and unpacking [us]."""
 
     solves: int
     failures: int
@@ -108,7 +108,7 @@ class SynthesisReport:
 
 @dataclass(frozen=True)
 class TimingReport:
-    """Simulated time, wall time of loop, monitor and recording, and their ratio."""
+    """The time: simulated, wall time of loop, monitor and recording [s], and their ratio [-]."""
 
     sim_s: float
     wall_s: float
@@ -117,11 +117,11 @@ class TimingReport:
 
 @dataclass(frozen=True)
 class Report:
-    """The result of a run, as ``report.json`` holds it; finite numbers only.
+    """The result of a run, as in ``report.json``; all numbers are finite.
 
-    ``disturbed`` says whether the tolerances for disturbed runs counted. ``failures`` are in order
-    of time, so that the first is the cause. ``phases`` are in the order in which they were come
-    through, backwards while lowering; ``events`` is what the guard found, and what it did.
+    ``disturbed`` says whether the tolerances for disturbed runs were used. ``failures`` are in
+    order of time, so that the first is the cause. ``phases`` are in the order in which they were
+    passed, backwards while lowering. ``events`` are the findings and reactions of the guard.
     """
 
     scenario: str
@@ -189,14 +189,14 @@ class RunInfo:
 
     Attributes:
         controller: Name of the controller.
-        objective: What the synthesis minimised.
+        objective: Objective of the synthesis.
         seed: Seed of the run.
         wall_s: Wall time of loop, monitor and recording [s].
         interrupted: Whether the run was stopped before its end.
-        error: What ended the run, if something did.
-        recording: Name of the recording's file.
-        collisions: Pairs of geoms that touched against the scenario's will, and when first [s].
-        events: What the guard found, and what it did.
+        error: Error that ended the run; None if there was none.
+        recording: Name of the recording's file; None if there is none.
+        collisions: Pairs of geoms that touched although they must not, with the first time [s].
+        events: Findings and reactions of the guard.
     """
 
     controller: str

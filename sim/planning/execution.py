@@ -99,7 +99,7 @@ def planned_tilt(
             final_deg=0.5,
             error_deg=1.0,
             slip_mm=1.0,
-            spin_deg=0.2,  # fastest tilt of a cuboid: 0.13, and a quarter of that at half the step
+            spin_deg=0.2,  # numerical: at most 0.13, and a quarter of that at half the step
             utilisation=1.01,  # slip is judged instead; values above 1 are rounding
             force_error=0.1,  # 5 % without deviations, since forces jump with the acceleration
             support_force_error=0.1,

@@ -25,7 +25,7 @@ from scipy.spatial import ConvexHull
 
 from fulcrum.sim.geometry import Geom, read_mesh
 from fulcrum.sim.model import contact_axes, tip_geom, tip_site
-from fulcrum.sim.plant.drake_model import Bodies, Place, pose
+from fulcrum.sim.plant.drake_model import Bodies, Mount, pose
 from fulcrum.sim.scenario import SUPPORT, ContactMaterial, Friction, Rest, Scenario, Support
 from fulcrum.synthesis.arrays import Array
 
@@ -76,7 +76,7 @@ class Contacts:
         self.wanted: dict[GeometryId, int] = {}
         self.names: dict[GeometryId, str] = {}
         self.object_ids: set[GeometryId] = set()
-        self.tips: list[Place] = []
+        self.tips: list[Mount] = []
         self.pads: list[Array] = []
         self._ids: list[GeometryId] = []
         # Sets of geometries that may touch each other.
@@ -108,7 +108,7 @@ class Contacts:
         points = radius * np.array([np.cos(angles), np.sin(angles), 0.0 * angles]).T
         share = ContactMaterial(hand.material.stiffness / count, hand.material.damping_s)
         at = place.X_BG @ RigidTransform([0.0, 0.0, float(tip.size[0])])
-        pad = self._bodies.add_pad(hand.name, Place(place.body, at))
+        pad = self._bodies.add_pad(hand.name, Mount(place.body, at))
         ring = [
             self._add(
                 pad,

@@ -41,7 +41,7 @@ _JOINTS = {
 
 
 @dataclass(frozen=True)
-class Place:
+class Mount:
     """A place in the scene: the body that carries it, and the pose on that body."""
 
     body: RigidBody
@@ -80,12 +80,12 @@ class Bodies:
                 self._add(body, inertias[body])
         plant.mutable_gravity_field().set_gravity_vector(scene.opt.gravity)
 
-    def place(self, body: int, position: Array, quaternion: Array) -> Place:
+    def place(self, body: int, position: Array, quaternion: Array) -> Mount:
         """Return the place of a geom or site from its pose on one of the scene's bodies."""
         carrier, X_LB = self._carriers[body]
-        return Place(self._links[carrier], X_LB @ pose(position, quaternion))
+        return Mount(self._links[carrier], X_LB @ pose(position, quaternion))
 
-    def add_pad(self, name: str, place: Place) -> RigidBody:
+    def add_pad(self, name: str, place: Mount) -> RigidBody:
         """Add a body on two hinges, about x and y of a place, held upright by a weak spring."""
         plant, parent = self._plant, place.body
         frame = plant.AddFrame(FixedOffsetFrame(f"{name}/pad", parent.body_frame(), place.X_BG))

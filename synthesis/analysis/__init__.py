@@ -1,4 +1,4 @@
-"""What a problem's solution or infeasibility means: sensitivities, relaxations, conflicts."""
+"""Analysis of a solution or of infeasibility: sensitivities, relaxations, conflicts."""
 
 from fulcrum.synthesis.analysis.conflict import Conflict, and_list, relaxed, tightest
 from fulcrum.synthesis.analysis.relaxation import (

@@ -1,18 +1,18 @@
 r"""A certificate of infeasibility in words: which balances conflict with which limits.
 
-Its multipliers are a virtual motion: the object moves with the twist :math:`\nu`, joints at a limit
-turn by :math:`\gamma`, and at each contact the two sides part by y. In that motion the weight and
-the preloads do more work than the limits can take up, whatever the forces: this is the proof, and
-``bearable`` is the limits' work over that of weight and preloads. Shares compare the sizes of these
-motions in metres: rotations count at the arm of the contact that is farthest from the centre of
-mass, joints as they move the hands. They are indications, not part of the proof; a share of zero is
-exact: such a constraint is not needed for it.
+The multipliers are a virtual motion: the object moves with the twist :math:`\nu`, joints at a limit
+turn by :math:`\gamma`, and at each contact the two sides separate by y. In that motion the weight
+and the preloads do more work than the limits can take up, whatever the forces. This is the proof,
+and ``bearable`` is the limits' work over that of weight and preloads. Shares compare the sizes of
+these motions in metres: rotations at the lever arm of the contact farthest from the centre of mass,
+joints by the motion of the hands. They are indications and not part of the proof, but a constraint
+whose share is zero is not needed for the proof.
 
-Nor does a share say that relaxing that limit alone helps: where two hands squeeze, each one's
-torque limit can hold the other's grip back by itself (:func:`relaxed` serves to try).
+A share does not say that relaxing this limit alone helps: if two hands squeeze, the torque limits
+of each can limit the other's grip. :func:`relaxed` makes the problems to try.
 
-An infeasible problem has many proofs. The solver's own leans a little on everything; one from the
-border of feasibility (:mod:`synthesis.analysis.relaxation`) leans on what really holds the border.
+An infeasible problem has many proofs. The solver's own uses almost every constraint a little. One
+from the border of feasibility (:mod:`synthesis.analysis.relaxation`) uses only those that limit.
 """
 
 from __future__ import annotations
@@ -28,32 +28,30 @@ from fulcrum.synthesis.arrays import Array, N
 from fulcrum.synthesis.problem import Gravity
 from fulcrum.synthesis.solution import certificate as make_certificate
 
-# Shares below this are the solver's noise and left out.
+# Smaller shares are the solver's noise and left out.
 NEGLIGIBLE = 1e-4
-# How near to the edge of its dual cone a multiplier counts as on it: there the contact slides.
+# Relative distance from the surface of its dual cone within which a multiplier counts as on it: the
+# contact slides.
 _ON_EDGE = 1e-3
 
-BALANCES = (
-    "force balance along world x",
-    "force balance along world y",
-    "force balance along world z",
-    "moment balance about world x",
-    "moment balance about world y",
-    "moment balance about world z",
+BALANCES = tuple(
+    f"{balance} world {axis}"
+    for balance in ("force balance along", "moment balance about")
+    for axis in "xyz"
 )
 
 
 @dataclass(frozen=True)
 class Conflict:
-    """Why no forces exist.
+    """The constraints that contradict each other, so that no forces exist.
 
     Attributes:
-        balances: Share of each of the equations of equilibrium in world axes, with moments about
-            the centre of mass; they add up to 1, heaviest first, negligible ones left out.
-        limits: The same of friction cones, bounds and torque limits.
-        asked: What the weight and each preload ask for, as shares that add up to 1.
-        given: What each limit can give at most, in the same measure; they add up to ``bearable``.
-        bearable: Share of what is asked for that the limits can give, below 1.
+        balances: Share of each equation of equilibrium in world axes, moments about the centre of
+            mass. The shares sum to 1, heaviest first; negligible ones are left out.
+        limits: Shares of friction cones, bounds and torque limits, likewise.
+        asked: Demand of the weight and of each preload, as shares that sum to 1.
+        given: Largest contribution of each limit, in the same unit; they sum to ``bearable``.
+        bearable: Share of the demand that the limits can carry, below 1.
     """
 
     balances: dict[str, float]
@@ -64,23 +62,21 @@ class Conflict:
 
     @property
     def sentence(self) -> str:
-        """The conflict for a roboticist."""
-        balances, limits = _list(self.balances), _list(self.limits)
-        text = (
-            f"{balances} cannot be met within {limits}" if limits else f"{balances} cannot be met"
-        )
-        asked = and_list(list(self.asked)) + (" asks" if len(self.asked) == 1 else " ask")
-        if not self.given:
-            return f"{text}: nothing there can give what {asked} for"
-        return f"{text}: at most {100 * self.bearable:.3g} % of what {asked} for can be given"
+        """Return the conflict as a sentence."""
+        limits = _list(self.limits)
+        within = f" within {limits}" if limits else ""
+        asked = and_list(list(self.asked))
+        share = f"at most {100 * self.bearable:.3g} %" if self.given else "none"
+        carried = f"the contacts can carry {share} of {asked}"
+        return f"{_list(self.balances)} cannot be met{within}: {carried}"
 
 
 def conflict(certificate: Certificate, gravity: Gravity, R_WO: Array) -> Conflict:
-    """The conflict that a certificate proves.
+    """Return the conflict that a certificate proves.
 
     Args:
-        certificate: Of a problem whose external wrench contains the weight.
-        gravity: The weight, with the centre of mass for moments to be about.
+        certificate: Certificate of a problem whose external wrench contains the weight.
+        gravity: The weight; moments are about its centre of mass.
         R_WO: Orientation of the object in the world, (3, 3).
     """
     problem, multipliers = certificate.problem, certificate.multipliers
@@ -102,13 +98,13 @@ def conflict(certificate: Certificate, gravity: Gravity, R_WO: Array) -> Conflic
 def tightest(
     certificate: Certificate, found: Mapping[Kind, Change], force_bound: float = 1e4
 ) -> Certificate:
-    """The sharpest proof at hand that a problem is infeasible.
+    """Return the proof of infeasibility that uses the fewest constraints.
 
     Args:
-        certificate: The solver's own.
-        found: Changes that make the problem feasible; just beyond the border of less weight or
+        certificate: The solver's own proof, which is returned if no other holds.
+        found: Changes that make the problem feasible. Just beyond the border of less weight or
             stronger limits lies a proof that also holds for the problem itself.
-        force_bound: Forces up to which it has to prove [N].
+        force_bound: Forces up to which the proof must hold [N].
     """
     for kind in (Kind.WEIGHT, Kind.GRIP, Kind.TORQUE):
         change = found[kind]
@@ -120,12 +116,12 @@ def tightest(
 
 
 def rebased(proof: Certificate, problem: Problem) -> Certificate:
-    """The same multipliers for a problem with other loads and limits; may prove nothing there."""
+    """Return the same multipliers for another problem, for which they may prove nothing."""
     return make_certificate(problem, proof.multipliers)
 
 
 def relaxed(problem: Problem, share: float) -> dict[str, Problem]:
-    """The problem with one limit at a time relaxed by a share of it, by the limit's name."""
+    """Return problems in which one limit is relaxed by a share of it, by the limit's name."""
     problems = {}
     for i, contact in enumerate(problem.contacts):
         for name, looser in (
@@ -150,7 +146,7 @@ def relaxed(problem: Problem, share: float) -> dict[str, Problem]:
 
 
 def _limit_motions(certificate: Certificate, arm: float) -> dict[str, float]:
-    """Size of the virtual motion that each limit stands against [m per unit of work]."""
+    """Return the size of the virtual motion that each limit resists [m per unit of work]."""
     problem, multipliers = certificate.problem, certificate.multipliers
     sizes = {}
     for i, contact in enumerate(problem.contacts):
@@ -167,19 +163,19 @@ def _limit_motions(certificate: Certificate, arm: float) -> dict[str, float]:
 
 
 def _levers(problem: Problem, arm: float) -> dict[str, float]:
-    """How much each joint moves the hand that it moves most [m per rad, or 1]."""
+    """Return the motion of the hand that each joint moves most [m per rad, or 1]."""
     joints = problem.joints
     if joints is None:
         return {}
     J = joints.J_C * np.array([1.0, 1.0, 1.0, arm, arm, arm])[:, None]
     levers = np.linalg.norm(J, axis=1).max(axis=0)
-    # A joint that moves no hand can still fail to hold its own arm.
+    # A joint that moves no hand may still be too weak for its own arm.
     levers[levers == 0.0] = arm
     return dict(zip(joints.names, levers.tolist(), strict=True))
 
 
 def _work(certificate: Certificate) -> tuple[dict[str, float], dict[str, float]]:
-    """The terms of the certificate's value: work asked for, and work that limits can give."""
+    """Return the terms of the certificate's value: work demanded, and work of the limits."""
     problem, multipliers = certificate.problem, certificate.multipliers
     terms = {"the weight": float(multipliers.equilibrium @ problem.w_ext_B)}
     for contact, alpha, beta in zip(
@@ -196,17 +192,16 @@ def _work(certificate: Certificate) -> tuple[dict[str, float], dict[str, float]]
                 work += multipliers.tau_max[k] * (joints.tau_g[k] - joints.tau_max[k])
             if np.isfinite(joints.tau_min[k]):
                 work += multipliers.tau_min[k] * (joints.tau_min[k] - joints.tau_g[k])
-            if work > 0.0:  # The arm cannot hold itself up.
-                terms[f"the weight of the arm at {name}"] = float(work)
-            else:
-                terms[f"torque limit of {name}"] = float(work)
+            # Above 0 the arm cannot hold itself up.
+            kind = "the weight of the arm at" if work > 0.0 else "torque limit of"
+            terms[f"{kind} {name}"] = float(work)
     asked = {name: work for name, work in terms.items() if work > 0.0}
     given = {name: -work for name, work in terms.items() if work < 0.0}
     return asked, given
 
 
 def _shares(sizes: dict[str, float]) -> dict[str, float]:
-    """Sizes over their sum, heaviest first, without the negligible ones."""
+    """Return the sizes over their sum, heaviest first, without negligible ones."""
     total = sum(sizes.values())
     kept = _kept({name: size / total for name, size in sizes.items()} if total > 0.0 else {})
     total = sum(kept.values())
@@ -223,5 +218,5 @@ def _list(shares: dict[str, float]) -> str:
 
 
 def and_list(words: list[str]) -> str:
-    """Words as English lists them."""
+    """Return words as an English list: "a, b and c"."""
     return " and ".join(part for part in (", ".join(words[:-1]), *words[-1:]) if part)

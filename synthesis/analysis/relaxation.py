@@ -1,15 +1,15 @@
-r"""How far a problem is from being feasible, or infeasible: the smallest change of a single kind.
+r"""The smallest change of a single kind that makes a problem feasible, or infeasible.
 
-Four kinds of change are looked at, each by one factor k: all friction coefficients times k, all
+There are four kinds of change, each with one factor k: all friction coefficients times k, all
 torque limits times k, the object's weight times k, all finite grip limits times k. The constraints
 are affine in the last three; their feasible factors are an interval, whose ends
 :mod:`synthesis.analysis.factor` computes. Friction multiplies forces: the cones of a smaller factor
 lie within those of a larger one, so that feasibility is quasi-convex in it, and the smallest
 feasible factor is bisected.
 
-Every factor found is confirmed: the changed problem is solved again a little to either side of it
-by the :class:`Synthesizer`, which has to find forces on the one and a certificate of infeasibility
-on the other. That certificate says what holds the factor back.
+Every factor is confirmed: the :class:`Synthesizer` solves the changed problem again a little to
+either side of it, and must find forces on one side and a certificate of infeasibility on the other.
+That certificate says what limits the factor.
 """
 
 from __future__ import annotations
@@ -23,7 +23,6 @@ import numpy as np
 
 from fulcrum.synthesis import (
     Certificate,
-    ContactModel,
     InfeasibleError,
     Objective,
     Problem,
@@ -35,19 +34,19 @@ from fulcrum.synthesis.arrays import Array
 from fulcrum.synthesis.problem import Gravity
 from fulcrum.synthesis.solution import shrink_cones
 
-# How far to either side of a factor it is confirmed, relative. The first is a thousand solver
-# tolerances; the others serve where forces are a hundred and more times the weight.
+# Relative distances at which a factor is confirmed. The first is a thousand solver tolerances; the
+# others are for forces of more than a hundred times the weight.
 _CONFIRMATIONS = (1e-6, 1e-5, 1e-4)
-# The bisection's last interval, relative.
+# Last interval of the bisection, relative.
 _BISECTED = 1e-7
-# Friction is tried in steps of this factor, so many to either side of 1.
+# Friction is tried in steps of this factor, and this many steps to either side of 1.
 _FRICTION_STEP, _FRICTION_STEPS = 4.0, 5
-# The weight, over the given one, with which "any weight can be held" is confirmed.
+# Multiple of the weight with which "any weight can be held" is confirmed.
 _MUCH_WEIGHT = 1e3
 
 
 class Kind(StrEnum):
-    """What is multiplied by the factor."""
+    """The quantity that a factor multiplies."""
 
     FRICTION = "friction coefficients"
     TORQUE = "torque limits"
@@ -56,10 +55,11 @@ class Kind(StrEnum):
 
 
 class ChangeOutcome(StrEnum):
-    """What was found about a kind of change.
+    """The result for a kind of change.
 
-    BOUND: the feasible factors end at the one given. ALWAYS: no factor on the harmful side makes
-    the problem infeasible. NEVER: no factor makes it feasible. ABSENT: it has nothing of the kind.
+    BOUND: the feasible factors end at the given factor. ALWAYS: no factor on the harmful side makes
+    the problem infeasible. NEVER: no factor makes it feasible. ABSENT: the problem has no such
+    quantity.
     """
 
     BOUND = "bound"
@@ -70,19 +70,18 @@ class ChangeOutcome(StrEnum):
 
 @dataclass(frozen=True, eq=False)
 class Change:
-    """One kind of change, and how much of it a problem needs to be feasible, or bears.
+    """One kind of change, with the factor that makes a problem feasible or infeasible.
 
     Attributes:
-        kind: What is multiplied.
-        outcome: What was found.
-        factor: The end of the feasible factors [-]: for an infeasible problem the one nearest to 1,
-            for a feasible one that on the harmful side. For ``ALWAYS`` the most harmful factor
-            that was looked at (0, infinity for the weight; friction is not looked at beyond about
-            1000 times either way), for ``NEVER`` and friction the most helpful one; else 1.
-        confirmed_within: How near to the factor, relative, solving again tells feasible from
-            infeasible [-]; 0 where there is no such border, infinite if it could not be confirmed.
-        conflict: What stands in the way: the certificate just beyond the factor or, for ``NEVER``,
-            of the problem with as much of the change as can be.
+        kind: The quantity that is multiplied.
+        outcome: The result.
+        factor: End of the feasible factors [-]: for an infeasible problem the one nearest to 1, for
+            a feasible one that on the harmful side. For ``ALWAYS`` the most harmful factor tried
+            (0, or infinity for the weight; friction up to about 1000 times either way), for
+            ``NEVER`` and friction the most helpful one; else 1.
+        confirmed_within: Relative distance from the factor at which solving again separates
+            feasible from infeasible [-]; 0 without a border, infinite if not confirmed.
+        conflict: Certificate just beyond the factor; for ``NEVER`` that of the largest change.
     """
 
     kind: Kind
@@ -93,12 +92,12 @@ class Change:
 
 
 def changes(problem: Problem, gravity: Gravity, synthesizer: Synthesizer) -> dict[Kind, Change]:
-    """For each kind of change how much of it a problem needs, or bears.
+    """Return for each kind the smallest change that makes a problem feasible, or infeasible.
 
     Args:
-        problem: A problem with a hand, whose external wrench contains the weight.
+        problem: Problem with a hand, whose external wrench contains the weight.
         gravity: The weight.
-        synthesizer: Confirms what is found.
+        synthesizer: Solver that confirms each factor.
 
     Raises:
         SolverError: The solver stopped without an answer.
@@ -107,7 +106,7 @@ def changes(problem: Problem, gravity: Gravity, synthesizer: Synthesizer) -> dic
 
 
 def change(kind: Kind, problem: Problem, gravity: Gravity, synthesizer: Synthesizer) -> Change:
-    """What :func:`changes` gives for one kind."""
+    """Return the change of one kind; see :func:`changes`."""
     problem = _bare(problem)
     if kind is Kind.FRICTION:
         return _friction_change(problem, synthesizer)
@@ -126,15 +125,13 @@ def change(kind: Kind, problem: Problem, gravity: Gravity, synthesizer: Synthesi
 def weight_range(
     problem: Problem, gravity: Gravity, synthesizer: Synthesizer
 ) -> tuple[float, float]:
-    """The lightest and the heaviest object that can be held in the pose of a problem [N].
+    """Return the least and the largest weight that can be held in the pose of a problem [N].
 
-    The external wrench beside the weight stays what it is. A preload may ask for some weight.
-
-    Returns:
-        The range; its upper end is infinite where a stronger grip bears any weight.
+    The rest of the external wrench does not change. A preload may need some weight. The largest
+    weight is infinite if a stronger grip carries any weight.
 
     Raises:
-        InfeasibleError: No weight can be held; carries the certificate for no weight.
+        InfeasibleError: No weight can be held; carries the certificate for zero weight.
         SolverError: The solver stopped without an answer.
     """
     family = _weighted(_bare(problem), gravity)
@@ -148,12 +145,12 @@ def weight_range(
 
 @dataclass(frozen=True)
 class _Family:
-    """Problems by the factor.
+    """The problems of one kind of change.
 
     Attributes:
-        at: The problem at a factor.
-        loosest: The problem at the factor that helps most.
-        lowest: Below this factor the numbers contradict themselves (a grip limit below a preload).
+        at: Function that returns the problem at a factor.
+        loosest: Problem at the factor that helps most.
+        lowest: Smallest valid factor: below it a grip limit is below a preload.
     """
 
     at: Callable[[float], Problem]
@@ -162,7 +159,7 @@ class _Family:
 
 
 def _bare(problem: Problem) -> Problem:
-    """The problem with an objective that is always bounded: only feasibility matters here."""
+    """Return the problem with an objective that is always bounded: only feasibility matters."""
     return replace(problem, objective=Objective.MAX_NORMAL_FORCE)
 
 
@@ -222,9 +219,9 @@ def _linear_change(kind: Kind, family: _Family, synthesizer: Synthesizer) -> Cha
 
 
 def _friction_change(problem: Problem, synthesizer: Synthesizer) -> Change:
-    """Bisects the factor between one that is feasible and one that is not."""
+    """Bisect the factor between a feasible and an infeasible one."""
     kind = Kind.FRICTION
-    if all(c.model is ContactModel.FRICTIONLESS for c in problem.contacts):
+    if not problem.contact_set.rough.any():
         return Change(kind, ChangeOutcome.ABSENT)
     family = _Family(at=lambda k: shrink_cones(problem, k), loosest=problem)
     conflict = _conflict(problem, synthesizer)
@@ -233,25 +230,24 @@ def _friction_change(problem: Problem, synthesizer: Synthesizer) -> Change:
         factor = last * _FRICTION_STEP if infeasible else last / _FRICTION_STEP
         try:
             beyond = _conflict(family.at(factor), synthesizer)
-        except SolverError:  # Such friction is out of the solver's reach.
+        except SolverError:  # The solver cannot solve such friction.
             break
         if (beyond is not None) is not infeasible:
             low, high = (last, factor) if infeasible else (factor, last)
             factor = _bisected(family, low, high, synthesizer)
             return _confirmed(kind, family, factor, math.inf, synthesizer)
         last, conflict = factor, beyond
-    return Change(
-        kind, ChangeOutcome.NEVER if infeasible else ChangeOutcome.ALWAYS, last, 0.0, conflict
-    )
+    outcome = ChangeOutcome.NEVER if infeasible else ChangeOutcome.ALWAYS
+    return Change(kind, outcome, last, 0.0, conflict)
 
 
 def _bisected(family: _Family, low: float, high: float, synthesizer: Synthesizer) -> float:
-    """The smallest feasible factor, between an infeasible and a feasible one."""
+    """Return the smallest feasible factor between an infeasible and a feasible one."""
     while high > low * (1.0 + _BISECTED):
         middle = math.sqrt(low * high)
         try:
             feasible = _conflict(family.at(middle), synthesizer) is None
-        except SolverError:  # On the brink; whether the factor is right is confirmed afterwards.
+        except SolverError:  # At the border; the factor is confirmed afterwards.
             feasible = False
         low, high = (low, middle) if feasible else (middle, high)
     return high
@@ -260,26 +256,26 @@ def _bisected(family: _Family, low: float, high: float, synthesizer: Synthesizer
 def _confirmed(
     kind: Kind, family: _Family, factor: float, other: float, synthesizer: Synthesizer
 ) -> Change:
-    """A bound, with what solving on both sides of it says.
+    """Return a bound that is confirmed by solving on both sides of it.
 
     Args:
-        kind: What is multiplied.
+        kind: The quantity that is multiplied.
         family: The problems.
-        factor: The end of the feasible factors in question.
+        factor: End of the feasible factors to confirm.
         other: Their other end.
-        synthesizer: Solves.
+        synthesizer: Solver.
     """
     sign = 1.0 if factor > other else -1.0
     conflict = None
     for within in _CONFIRMATIONS:
-        # A range of factors may be a single point.
+        # The range of factors may be a single point.
         inside = sign * max(sign * factor * (1.0 - sign * within), sign * other)
         outside = factor * (1.0 + sign * within)
         contradictory = outside < family.lowest
         try:
             conflict = None if contradictory else _conflict(family.at(outside), synthesizer)
             held = _conflict(family.at(inside), synthesizer) is None
-        except SolverError:  # Too near to the brink to tell.
+        except SolverError:  # Too close to the border to decide.
             continue
         if held and (contradictory or conflict is not None):
             return Change(kind, ChangeOutcome.BOUND, factor, within, conflict)
@@ -287,7 +283,7 @@ def _confirmed(
 
 
 def _conflict(problem: Problem, synthesizer: Synthesizer) -> Certificate | None:
-    """The certificate of an infeasible problem; None of a feasible one."""
+    """Return the certificate of an infeasible problem; None for a feasible one."""
     try:
         synthesizer.solve(problem)
     except InfeasibleError as error:

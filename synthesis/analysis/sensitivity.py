@@ -1,4 +1,4 @@
-r"""How the optimal objective of (17) changes with its parameters, from the multipliers alone.
+r"""Derivatives of the optimal objective of (17) by its parameters, from the multipliers alone.
 
 By the envelope theorem the optimal value changes with a parameter p as the Lagrangian does, at
 fixed forces and multipliers: :math:`d\Phi^*/dp = \partial L/\partial p`, with L as in
@@ -28,8 +28,8 @@ The friction margin s is where :math:`\lambda^*(s, p) = 0` for the parametric pr
 \partial s = -\sum y_n f_n / s`, so that :math:`ds/dp = (s / \sum y_n f_n)\, \partial\lambda^*/
 \partial p` with the same :math:`\partial\lambda^*/\partial p` as above.
 
-Where multipliers are not unique (more constraints active than there are forces to determine), the
-optimal value has a kink: each of them gives a slope between the left and the right one.
+If multipliers are not unique (more active constraints than forces to determine), the optimal value
+has a kink, and each set of multipliers gives a slope between the left and the right one.
 """
 
 from __future__ import annotations
@@ -38,11 +38,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from fulcrum.synthesis import ContactModel, Objective, Solution
+from fulcrum.synthesis import Objective, Solution
 from fulcrum.synthesis.arrays import N
 from fulcrum.synthesis.problem import Gravity
 
-# What the objective's unit is, for people.
+# Unit of each objective, as text.
 UNITS = {
     Objective.MAX_NORMAL_FORCE: "N",
     Objective.NORM_NORMAL_FORCE: "N",
@@ -55,16 +55,16 @@ UNITS = {
 
 @dataclass(frozen=True)
 class Sensitivities:
-    """Derivatives of the optimal objective, in units of the objective over that of the parameter.
+    """Derivatives of the optimal objective by each parameter [unit of the objective per ..].
 
     Attributes:
-        weight: By the weight [per N].
-        center_of_mass: By the centre of mass along the object's axes [per m].
-        friction: By the friction coefficient of each contact that has one [per 1].
-        f_n_min: By each contact's preload [per N].
-        f_n_max: By each contact's finite grip limit [per N].
-        tau_min: By each joint's finite lower torque limit, which is mostly negative [per N·m].
-        tau_max: By each joint's finite upper torque limit [per N·m].
+        weight: Derivative by the weight [per N].
+        center_of_mass: Derivatives by the centre of mass along the object's axes [per m].
+        friction: Derivatives by the friction coefficients, by contact with friction [per 1].
+        f_n_min: Derivatives by the preloads, by contact [per N].
+        f_n_max: Derivatives by the finite grip limits, by contact [per N].
+        tau_min: Derivatives by the finite lower torque limits, by joint [per N·m].
+        tau_max: Derivatives by the finite upper torque limits, by joint [per N·m].
     """
 
     weight: float
@@ -77,10 +77,10 @@ class Sensitivities:
 
 
 def sensitivities(solution: Solution, gravity: Gravity) -> Sensitivities:
-    """The derivatives of a solution's optimal value.
+    """Return the derivatives of a solution's optimal value.
 
     Args:
-        solution: The solution of a problem whose external wrench contains the weight.
+        solution: Solution of a problem whose external wrench contains the weight.
         gravity: The weight.
     """
     problem, multipliers = solution.problem, solution.multipliers
@@ -103,7 +103,7 @@ def sensitivities(solution: Solution, gravity: Gravity) -> Sensitivities:
         friction={
             contact.name: float(-y_n[i] * f_n[i] / contact.mu)
             for i, contact in enumerate(contacts)
-            if contact.model is not ContactModel.FRICTIONLESS
+            if contact.model.has_friction
         },
         f_n_min={c.name: float(scale * multipliers.f_n_min[i]) for i, c in enumerate(contacts)},
         f_n_max={
@@ -117,9 +117,9 @@ def sensitivities(solution: Solution, gravity: Gravity) -> Sensitivities:
 
 
 def _scale(solution: Solution) -> float:
-    """Factor that turns the multipliers into those of the objective; 1 but for the margin."""
+    """Return the factor from the multipliers to those of the objective; 1 except for the margin."""
     if solution.problem.objective is not Objective.FRICTION_MARGIN:
         return 1.0
-    with_friction = [c.model is not ContactModel.FRICTIONLESS for c in solution.problem.contacts]
-    work = (solution.multipliers.cone[:, N] * solution.w_OC_C[:, N])[with_friction].sum()
+    rough = solution.problem.contact_set.rough
+    work = (solution.multipliers.cone[:, N] * solution.w_OC_C[:, N])[rough].sum()
     return float(solution.value / work) if work > 0.0 else 0.0

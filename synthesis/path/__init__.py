@@ -1,4 +1,4 @@
-"""Timing, forces and torques along a whole path as one second-order cone program."""
+"""Timing, forces and torques along a whole path, as one second-order cone program."""
 
 from fulcrum.synthesis.path.limits import Accelerations, Rates
 from fulcrum.synthesis.path.loads import solve_many

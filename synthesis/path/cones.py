@@ -1,6 +1,6 @@
 r"""The time of a path's intervals as second-order cones.
 
-The time of an interval is :math:`2 \Delta s / (\sqrt{b_k} + \sqrt{b_{k+1}})`, which two cones bound
+Two cones bound the time of an interval, :math:`2 \Delta s / (\sqrt{b_k} + \sqrt{b_{k+1}})`
 (Verscheure et al. 2009, (46) to (51)):
 
 .. math:: c_k^2 \le b_k, \qquad 2 \Delta s_k \le t_k (c_k + c_{k+1})
@@ -17,11 +17,11 @@ from fulcrum.synthesis.path.rows import Rows
 
 
 def timing_cones(rows: Rows, s: Array, b: Indices, c: Indices, t: Indices) -> None:
-    r"""Adds :math:`(1 + b) / 2 \ge \|(c, (1 - b) / 2)\|` and, with :math:`r = c_k + c_{k+1}`,
+    r"""Add :math:`(1 + b) / 2 \ge \|(c, (1 - b) / 2)\|` and, with :math:`r = c_k + c_{k+1}`,
     :math:`(t + r) / 2 \ge \|(\sqrt 2, (t - r) / 2)\|`.
 
     Args:
-        rows: Where they go.
+        rows: Program to which the cones are added.
         s: Grid points, (K,).
         b, c: Columns of squared rates and rates at the grid points, (K,).
         t: Columns of the times of the intervals, (K - 1,).
@@ -29,7 +29,7 @@ def timing_cones(rows: Rows, s: Array, b: Indices, c: Indices, t: Indices) -> No
     # Rates are in units of the mean rate of the path in one timescale: all numbers are about 1.
     mean = s[-1] - s[0]
     share = np.diff(s) / mean
-    # Rates at the ends are constants: their cones would have no interior, and say nothing.
+    # Rates at the ends are constants: their cones would have no interior, and are not needed.
     if len(s) > 2:
         inner = rows.new(np.tile([0.5, 0.0, 0.5], (len(s) - 2, 1)), s[1:-1], [""] * 3)
         rows.add(-0.5 / mean**2, inner[:, 0], b[1:-1])

@@ -1,6 +1,6 @@
-r"""Forces with one load of a path problem where timing and grip are given.
+r"""Forces with one load of a path problem whose timing and grip are given.
 
-What is left, alone at every station, is
+The remaining problem, separate for every station, is
 
 .. math::
 
@@ -8,9 +8,9 @@ What is left, alone at every station, is
     \text{subject to}\quad & \|f_i\| \le s\,f_{n,i} + \lambda \text{ at every contact} \\
                            & \text{equilibrium, (16), and (7) at the environment}
 
-and there are forces if :math:`\lambda \le 0`. Where those with another load are known already, they
-often serve with a small change: the least one that restores equilibrium, weighted by what each
-contact has, :math:`\Delta F = D^2 G^T (G D^2 G^T)^{-1} r`.
+and forces exist if :math:`\lambda \le 0`. Known forces with another load often need only a small
+change: the least one that restores equilibrium, weighted by the size of each contact's cone,
+:math:`\Delta F = D^2 G^T (G D^2 G^T)^{-1} r`.
 """
 
 from __future__ import annotations
@@ -20,20 +20,20 @@ from dataclasses import replace
 
 import numpy as np
 
-from fulcrum.synthesis.arrays import Array, Mask, N
+from fulcrum.synthesis.arrays import Array, Indices, Mask, N
 from fulcrum.synthesis.path.form import PathForm
 from fulcrum.synthesis.path.problem import Load, PathObjective, PathProblem
 from fulcrum.synthesis.path.solution import InfeasiblePathError
 from fulcrum.synthesis.path.synthesizer import solve_form
 
-# What may be left of an imbalance, as a share of the load [-].
+# Largest imbalance, as a share of the load [-].
 _BALANCED = 1e-9
-# What is added to a matrix's diagonal, as a share of its trace [-].
+# Regularisation of a matrix's diagonal, as a share of its trace [-].
 _REGULAR = 1e-12
 
 
 class GivenMotion:
-    """Timing and grip of a path, and what loads take in it.
+    """Timing and grip of a path, for which forces with other loads are sought.
 
     Attributes:
         iterations: Interior-point iterations so far.
@@ -41,10 +41,10 @@ class GivenMotion:
     """
 
     def __init__(self, problem: PathProblem, b: Array, grip: Array, used: float) -> None:
-        """Takes over what is given.
+        """Set timing and grip.
 
         Args:
-            problem: The path; its loads and objective do not count.
+            problem: The path; its loads and objective are not used.
             b: Squared rate of s at the grid points [1/s^2], (K,).
             grip: Normal forces of the n hands at the stations [N], (S, n).
             used: Share of the friction that may be used [-].
@@ -56,13 +56,13 @@ class GivenMotion:
         self.iterations, self.solve_s = 0, 0.0
 
     def forces(self, load: Load, known: list[Array]) -> tuple[float, Array]:
-        """By how much friction lacks at the worst station, in units of the load; and forces.
+        """Return the lack of friction at the worst station, in units of the load, and forces.
 
-        Infinite, and no forces that count, where other limits lack.
+        The lack is infinite, and the forces are void, if another limit cannot be satisfied.
 
         Args:
             load: The load.
-            known: Forces with other loads, (S, m, 6) each, that may serve with a small change.
+            known: Forces with other loads, (S, m, 6) each, from which to start.
         """
         balance = _Balance(self._problem, load, self._point, self._motion)
         result, lacking = known[0].copy(), np.ones(len(self._point), bool)
@@ -77,9 +77,9 @@ class GivenMotion:
         return least, result
 
     def _sought(self, load: Load, where: Mask) -> tuple[float, Array]:
-        """The same at some stations, by the solver."""
+        """Return the same for some stations, from the solver."""
         hands, stations = load.problems[0].hands, int(where.sum())
-        # The hands' own bounds were for whoever chose the grip.
+        # The grip is given, so the bounds of the hands do not apply.
         contacts = tuple(
             replace(contact, f_n_min=0.0, f_n_max=math.inf) if i in hands else contact
             for i, contact in enumerate(load.problems[0].contacts)
@@ -106,20 +106,17 @@ class GivenMotion:
 class _Balance:
     """Equilibrium and limits of one load at all stations."""
 
-    def __init__(self, problem: PathProblem, load: Load, point: Array, motion: Array) -> None:
+    def __init__(self, problem: PathProblem, load: Load, point: Indices, motion: Array) -> None:
         self._load, self._point, self._facts = load, point, load.problems[0].contact_set
         self._own, self._motion = problem.inertial_torques, motion
-        self._G = np.stack([p.G for p in load.problems])[point]
-        self._G = self._G.transpose(0, 2, 1, 3).reshape(len(point), 6, -1)
+        self._G = load.G[point].transpose(0, 2, 1, 3).reshape(len(point), 6, -1)
         a, b = motion[:, :, None]
-        w_ext = np.stack([p.w_ext_B for p in load.problems])[point]
-        self._w_rest = w_ext - load.w_a_B[point] * a - load.w_b_B[point] * b
-        self._unit = max(p.load for p in load.problems) or 1.0
+        self._w_rest = load.w_ext_B[point] - load.w_a_B[point] * a - load.w_b_B[point] * b
 
     def restored(self, w_OC_C: Array) -> Array:
-        """Forces in equilibrium, nearest to these, with the hands' normal forces as they are."""
+        """Return the nearest forces in equilibrium, with the hands' normal forces unchanged."""
         facts, shape = self._facts, w_OC_C.shape
-        # Half a cone's width along each of its axes; a support's normal force counts like one.
+        # Half a cone's width along each of its axes; a support's normal force counts as 1.
         size = facts.reciprocal.copy()
         size[size > 0.0] = 1.0 / size[size > 0.0]
         size[list(facts.hands), N] = 0.0
@@ -128,32 +125,28 @@ class _Balance:
         flat = w_OC_C.reshape(shape[0], -1)
         r = -(np.einsum("sij,sj->si", self._G, flat) + self._w_rest)
         matrix = GD @ GD.transpose(0, 2, 1)
-        # Where nothing can bear a component this keeps the matrix regular, and the check says so.
+        # This keeps the matrix regular if no contact bears a component; `kept` rejects that case.
         matrix += _REGULAR * np.trace(matrix, axis1=1, axis2=2)[:, None, None] * np.eye(6)
         x = np.linalg.solve(matrix, r[..., None])
         return (flat + D * (GD.transpose(0, 2, 1) @ x)[..., 0]).reshape(shape)
 
     def kept(self, w_OC_C: Array, used: float) -> Mask:
-        """Where forces are in equilibrium and keep all limits, (S,)."""
+        """Return where forces are in equilibrium and within all limits, (S,)."""
         facts, point, f_n = self._facts, self._point, w_OC_C[..., N]
         flat = w_OC_C.reshape(len(point), -1)
         error = np.abs(np.einsum("sij,sj->si", self._G, flat) + self._w_rest).max(axis=1)
-        kept = error <= _BALANCED * self._unit
+        kept = error <= _BALANCED * self._load.unit
         kept &= (np.linalg.norm(w_OC_C * facts.friction, axis=2) <= used * f_n).all(axis=1)
         supports = np.setdiff1d(np.arange(f_n.shape[1]), facts.hands)
         bounded = f_n[:, supports]
         kept &= (bounded >= facts.f_n_min[supports]).all(axis=1)
         kept &= (bounded <= facts.f_n_max[supports]).all(axis=1)
-        own = self._own
-        if own is None:
+        if self._own is None:
             return kept
-        joints = [p.joints for p in self._load.problems if p.joints is not None]
-        hands = list(facts.hands)
-        J = np.stack([j.J_C for j in joints])[point]
-        tau = np.stack([j.tau_g for j in joints])[point]
-        tau = tau + np.einsum("snkl,snk->sl", J, w_OC_C[:, hands])
-        a, b = self._motion[:, :, None]
-        tau = tau + own.tau_a[point] * a + own.tau_b[point] * b + own.tau_c[point] * np.sqrt(b)
-        kept &= (tau <= np.stack([j.tau_max for j in joints])[point]).all(axis=1)
-        kept &= (tau >= np.stack([j.tau_min for j in joints])[point]).all(axis=1)
+        J = np.stack([joints.J_C for joints in self._load.joints])[point]
+        tau = np.stack([joints.tau_g for joints in self._load.joints])[point]
+        tau = tau + np.einsum("snkl,snk->sl", J, w_OC_C[:, list(facts.hands)])
+        tau = self._own.at(point).added_to(tau, *self._motion)
+        kept &= (tau <= self._load.tau_max[point]).all(axis=1)
+        kept &= (tau >= self._load.tau_min[point]).all(axis=1)
         return kept

@@ -4,11 +4,10 @@ Variables, in this order: b at the grid points, c at the grid points, the time t
 the forces of every station and load as in :mod:`synthesis.conic`, the torque utilisations (least
 effort only) and :math:`\lambda` (friction margin only). The normal forces of the hands have the
 same columns for all loads, b and c at the ends are constants, and a is eliminated by
-:math:`a_k = (b_{k+1} - b_k) / (2 \Delta s_k)`. What ties t, c and b to one another stands in
-:mod:`synthesis.path.cones`.
+:math:`a_k = (b_{k+1} - b_k) / (2 \Delta s_k)`. :mod:`synthesis.path.cones` relates t, c and b.
 
-Viscous friction counts with c, which is exact where time presses c to :math:`\sqrt b`. Where it
-does not, the problem is solved again about the last solution :math:`\bar b`, with the tangent
+Viscous friction is computed with c, which is exact where time presses c to :math:`\sqrt b`.
+Elsewhere the problem is solved again about the last solution :math:`\bar b`, with the tangent
 :math:`(b / \sqrt{\bar b} + \sqrt{\bar b}) / 2 \ge \sqrt b` for the rate.
 
 In :math:`\min \tfrac12 x^T P x + q^T x,\ Ax + s = h,\ s \in \mathcal{K}`, the rows are
@@ -35,16 +34,17 @@ from typing import Any, NamedTuple
 import numpy as np
 import scipy.sparse as sp
 
-from fulcrum.synthesis import Objective, Problem
+from fulcrum.synthesis import Objective
 from fulcrum.synthesis.arrays import Array, Indices, Mask
 from fulcrum.synthesis.conic import ConicForm
 from fulcrum.synthesis.path.cones import timing_cones
+from fulcrum.synthesis.path.limits import Accelerations
 from fulcrum.synthesis.path.problem import Load, PathObjective, PathProblem
 from fulcrum.synthesis.path.rows import Rows
 
 
 class _Block(NamedTuple):
-    """(17) of one load at all grid points, and where its forces stand."""
+    """Matrices of (17) of one load at all grid points, and the columns of its forces."""
 
     load: Load
     form: ConicForm
@@ -58,9 +58,9 @@ class PathForm:
 
     Attributes:
         problem: The problem.
-        rows: What the rows are.
-        P, q: The objective's data.
-        unit: Of forces and torques [N or N·m].
+        rows: Rows with their names and places.
+        P, q: Data of the objective.
+        unit: Unit of forces and torques [N or N·m].
     """
 
     def __init__(
@@ -70,14 +70,14 @@ class PathForm:
         grip: Array | None = None,
         where: Mask | None = None,
     ) -> None:
-        """Assembles the matrices.
+        """Assemble the matrices.
 
         Args:
             problem: The problem.
-            reference: b [1/s^2], (K,), about which viscous friction counts, if there is one.
-            grip: Normal forces of the n hands [N], (S, n), where they are given.
-            where: Which stations count, (S,), where the timing is given; all if left out. S is
-                their number from here on.
+            reference: b for the tangent of viscous friction [1/s^2], (K,); None to use c.
+            grip: Given normal forces of the n hands [N], (S, n); None if they are variables.
+            where: Mask of the stations to use if the timing is given, (S,); None for all. From
+                here on S is their number.
         """
         self.problem, self._reference, self._grip = problem, reference, grip
         self.rows = Rows()
@@ -115,23 +115,20 @@ class PathForm:
             if blocks:
                 columns[:, ~own] = blocks[0].columns[:, blocks[0].form.hand_normals]
             end += count
-            blocks.append(_Block(load, form, *self._matrices(form, load.problems), columns))
+            pairs = [form.matrices(problem) for problem in load.problems]
+            A = np.stack([A[:, : form.aux_column] for A, _ in pairs])
+            b = [b * p.unit for (_, b), p in zip(pairs, load.problems, strict=True)]
+            blocks.append(_Block(load, form, A, np.stack(b) / self.unit, columns))
         shape = len(blocks), stations, len(self._joints) if self._effort else 0
         self._u = end + np.arange(math.prod(shape)).reshape(shape)
         self._aux = end + self._u.size
         self._columns = self._aux + int(self._margin)
         return blocks
 
-    def _matrices(self, form: ConicForm, problems: tuple[Problem, ...]) -> tuple[Array, Array]:
-        pairs = [form.matrices(problem) for problem in problems]
-        A = np.stack([A[:, : form.aux_column] for A, _ in pairs])
-        b = [b * p.unit for (_, b), p in zip(pairs, problems, strict=True)]
-        return A, np.stack(b) / self.unit
-
     def _add_motion(
         self, rows: Indices, per_a: Array, per_b: Array, per_c: Array | None = None
     ) -> None:
-        """Terms in a, b and c at the stations, (S, r) each, per 1/s^2 and 1/s."""
+        """Add terms in a, b and c at the stations, (S, r) each, per 1/s^2 and 1/s."""
         if self._points == 1:
             return
         slope = per_a / (2.0 * self._ds[self._interval, None] * self._time**2)
@@ -144,16 +141,16 @@ class PathForm:
             self.rows.add(per_c / self._time, rows, self._c[self._point][:, None])
             return
         rate = np.sqrt(self._reference[self._point])[:, None]
-        # At the ends, where a rate may be zero, b is the reference's.
+        # At the ends, where a rate may be zero, b is that of the reference.
         slope = np.divide(0.5, rate, out=np.zeros_like(rate), where=rate > 0.0)
         self.rows.add(per_c * slope / self._time**2, rows, self._b[self._point][:, None])
         self.rows.shift(rows, per_c * rate / 2.0)
 
     def _inertial_torques(self) -> tuple[Array, Array, Array]:
-        """tau_a, tau_b and tau_c at the stations, (S, l) each."""
-        own = self.problem.inertial_torques
-        assert own is not None
-        return own.tau_a[self._point], own.tau_b[self._point], own.tau_c[self._point]
+        """Return tau_a, tau_b and tau_c at the stations, (S, l) each."""
+        assert self.problem.inertial_torques is not None
+        own = self.problem.inertial_torques.at(self._point)
+        return own.tau_a, own.tau_b, own.tau_c
 
     def _equalities(self) -> None:
         point, s = self._point, self.problem.s[self._point]
@@ -168,13 +165,13 @@ class PathForm:
         self.rows.end_equalities()
 
     def _utilisations(self, block: _Block, u: Indices) -> None:
-        """u = 2 tau / (tau_max - tau_min)."""
-        form, problems, point = block.form, block.load.problems, self._point
-        joints = [problem.joints for problem in problems if problem.joints is not None]
-        half = np.stack([(j.tau_max - j.tau_min) / 2.0 for j in joints])[point]
-        tau_g = np.stack([j.tau_g for j in joints])[point]
-        J = np.stack([j.J_C.reshape(-1, len(self._joints))[form.hand_flat] for j in joints])[point]
-        scale = problems[0].contact_set.scale[form.hand_columns] * self.unit
+        """Add the rows u = 2 tau / (tau_max - tau_min)."""
+        form, load, point = block.form, block.load, self._point
+        half = ((load.tau_max - load.tau_min) / 2.0)[point]
+        tau_g = np.stack([j.tau_g for j in load.joints])[point]
+        J = np.stack([j.J_C for j in load.joints]).reshape(len(load.joints), -1, half.shape[1])
+        J = J[:, form.hand_flat][point]
+        scale = load.problems[0].contact_set.scale[form.hand_columns] * self.unit
         names = [""] * len(self._joints)
         rows = self.rows.new(-tau_g / half, self.problem.s[point], names)
         J_scaled = J.transpose(0, 2, 1) * scale / half[:, :, None]
@@ -203,8 +200,7 @@ class PathForm:
 
     def _bounds(self, block: _Block) -> None:
         load, form, A, b, columns = block
-        point, joints = self._point, load.problems[0].joints
-        bounds = slice(form.f_n_min_rows.start, form.tau_min_rows.stop)
+        point, bounds = self._point, form.bound_rows
         scale = 1.0 / np.maximum(1.0, np.abs(b[:, bounds]))
         contacts = [contact.name for contact in load.problems[0].contacts]
         names = [f"f_n_min of {contacts[i]}" for i in form.preloaded]
@@ -213,7 +209,7 @@ class PathForm:
         names += [f"torque of {self._joints[j]}" for j in limits]
         rows = self.rows.new((b[:, bounds] * scale)[point], self.problem.s[point], names)
         self.rows.add_block((A[:, bounds] * scale[..., None])[point], rows, columns)
-        if joints is not None and len(limits):
+        if len(limits):
             torques = slice(rows.shape[1] - len(limits), None)
             sign = np.repeat([1.0, -1.0], [len(form.upper), len(form.lower)]) / self.unit
             factor = sign * scale[point][:, torques]
@@ -225,10 +221,8 @@ class PathForm:
         s = self.problem.s[self._point]
         for load, form, A, b, columns in self._blocks:
             contacts, heads = load.problems[0].contacts, []
-            start = form.cone_rows.start
-            for i, width in form.cones:
+            for (i, width), start in zip(form.cones, form.cone_heads, strict=True):
                 own = slice(start, start + width)
-                start += width
                 names = [f"friction of {contacts[i].name}"] * width
                 rows = self.rows.new(b[self._point][:, own], s, names)
                 self.rows.add_block(A[self._point][:, own], rows, columns)
@@ -237,12 +231,11 @@ class PathForm:
             self._heads.append(np.stack(heads, axis=1) if heads else np.zeros((0, 0), np.intp))
         if self._timed:
             timing_cones(self.rows, self.problem.s, self._b, self._c, self._t)
-            self._acceleration_cones()
+            if self.problem.accelerations is not None:
+                self._acceleration_cones(self.problem.accelerations)
 
-    def _acceleration_cones(self) -> None:
-        limited, point = self.problem.accelerations, self._point
-        if limited is None:
-            return
+    def _acceleration_cones(self, limited: Accelerations) -> None:
+        point = self._point
         for j in np.flatnonzero(np.isfinite(limited.limits)):
             h = np.tile([1.0, 0.0, 0.0, 0.0], (len(point), 1))
             names = [f"acceleration of {limited.names[j]}"] * 4
@@ -252,7 +245,7 @@ class PathForm:
             self.rows.second_order(rows)
 
     def _finish(self) -> None:
-        """A and h with what is constant moved to the right; P and q."""
+        """Set A and h, with constants moved to the right side, and P and q."""
         whole, h = self.rows.data(self._columns)
         problem = self.problem
         b, fixed = np.zeros(self._points), np.zeros(self._columns, bool)
@@ -273,7 +266,7 @@ class PathForm:
         self._free = np.flatnonzero(~fixed)
         self._h = h - whole @ self._constant
         self._A = whole[:, self._free]
-        self._A.eliminate_zeros()  # which are a tenth, and cost the solver time
+        self._A.eliminate_zeros()  # a tenth of the entries, which would cost the solver time
         q, P = np.zeros(self._columns), np.zeros(self._columns)
         q[self._t] = float(problem.objective is PathObjective.LEAST_TIME)
         if self._margin:
@@ -284,18 +277,19 @@ class PathForm:
         self.P = sp.diags_array(P[self._free]).tocsc()
 
     def _weights(self) -> Array:
-        """Share of each station in the mean over path and loads, (S,)."""
+        """Return the share of each station in the mean over path and loads, (S,)."""
         share = np.ones(1)
         if self._points > 1:
             share = np.repeat(self._ds / self._ds.sum() / 2.0, 2)
         return share / len(self._blocks)
 
     def matrices(self, utilisation: float, slack: list[Array] | None) -> tuple[Any, Array]:
-        """A and h; with a friction margin those of its parameters s and d, see the synthesizer.
+        """Return A and h; for a friction margin with its parameters s and d.
 
         Args:
-            utilisation: s [-].
-            slack: d [N] of each load, (S, m); None for the first problem, with lambda <= 0.
+            utilisation: Parameter s [-].
+            slack: Parameters d of each load [N], (S, m); None for the first problem, with
+                lambda <= 0.
         """
         if not self._margin:
             return self._A, self._h
@@ -312,17 +306,17 @@ class PathForm:
         return self._A + change.data(self._columns)[0][:, self._free], h
 
     def completed(self, x: Array) -> Array:
-        """All variables of those that the solver found."""
+        """Return all variables, from those of the solver and the constants."""
         every = self._constant.copy()
         every[self._free] = x
         return every
 
     def squared_rates(self, every: Array) -> Array:
-        """b at the grid points [1/s^2], (K,)."""
+        """Return b at the grid points [1/s^2], (K,)."""
         return every[self._b] / self._time**2
 
     def wrenches(self, every: Array) -> tuple[Array, ...]:
-        """Contact wrenches with each load [N, N·m], (S, m, 6)."""
+        """Return the contact wrenches with each load [N, N·m], (S, m, 6)."""
         found = []
         for load, form, _, _, columns in self._blocks:
             w_OC_C = np.zeros((len(self._point), 6 * form.m))
@@ -332,7 +326,7 @@ class PathForm:
         return tuple(found)
 
     def value(self, every: Array) -> float:
-        """The duration [s], or the mean squared effort [-]."""
+        """Return the duration [s], or the mean squared effort [-]."""
         if self._effort:
             return float(((every[self._u] ** 2).sum(axis=2) @ self._weights()).sum())
         return float(every[self._t].sum()) * self._time

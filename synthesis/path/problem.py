@@ -1,7 +1,7 @@
-r"""Forces and timing along a path at once: problem (17) at every grid point, with inertia.
+r"""Forces and timing along a path: problem (17) at every grid point, with inertia.
 
-The path coordinate s runs over a grid :math:`s_0 < \dots < s_N`; its timing is
-:math:`b = \dot s^2` at the grid points and :math:`a = \ddot s`, constant between them, so that
+The path coordinate s runs over a grid :math:`s_0 < \dots < s_N`. Its timing is :math:`b = \dot s^2`
+at the grid points and :math:`a = \ddot s`, constant between them, so that
 :math:`b_{k+1} - b_k = 2 a_k (s_{k+1} - s_k)` holds exactly.
 """
 
@@ -10,16 +10,17 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, field, replace
 from enum import StrEnum
+from functools import cached_property
 
 import numpy as np
 
-from fulcrum.synthesis import ContactModel, InvalidInputError, Problem
+from fulcrum.synthesis import InvalidInputError, Joints, Problem, checks
 from fulcrum.synthesis.arrays import Array, Indices
-from fulcrum.synthesis.path.limits import Accelerations, Rates, check_array
+from fulcrum.synthesis.path.limits import Accelerations, Rates
 
 
 class PathObjective(StrEnum):
-    """What is minimised along the path."""
+    """The quantity to minimise along the path."""
 
     LEAST_TIME = "least-time"
     LEAST_EFFORT = "least-effort"
@@ -27,19 +28,19 @@ class PathObjective(StrEnum):
 
     @property
     def needs_duration(self) -> bool:
-        """Whether only a largest duration makes the answer finite and useful."""
+        """Return whether the solution needs a largest duration to be finite and useful."""
         return self is not PathObjective.LEAST_TIME
 
 
 @dataclass(frozen=True, eq=False)
 class InertialTorques:
-    r"""What motion costs in joint torque: :math:`\tau_a a + \tau_b b + \tau_c \sqrt b`.
+    r"""Joint torque that motion needs: :math:`\tau_a a + \tau_b b + \tau_c \sqrt b`.
 
     Along joint angles q(s) the robot's dynamics give :math:`\tau_a = M q'`,
     :math:`\tau_b = M q'' + C(q, q') q'` and, with viscous joint friction D, :math:`\tau_c = D q'`.
 
     Attributes:
-        tau_a, tau_b, tau_c: (K, l).
+        tau_a, tau_b, tau_c: Coefficients of a, b and the square root of b, (K, l).
     """
 
     tau_a: Array
@@ -48,7 +49,16 @@ class InertialTorques:
 
     def __post_init__(self) -> None:
         for name in ("tau_a", "tau_b", "tau_c"):
-            check_array(f"inertial_torques.{name}", getattr(self, name), np.shape(self.tau_a))
+            checks.array(f"inertial_torques.{name}", getattr(self, name), np.shape(self.tau_a))
+
+    def at(self, points: Indices) -> InertialTorques:
+        """Return the torques at some grid points, by index."""
+        return InertialTorques(self.tau_a[points], self.tau_b[points], self.tau_c[points])
+
+    def added_to(self, tau: Array, a: Array, b: Array) -> Array:
+        """Return torques at rest, (K, l), plus those of a motion a, b [1/s^2], (K,)."""
+        a, b = a[:, None], b[:, None]
+        return tau + self.tau_a * a + self.tau_b * b + self.tau_c * np.sqrt(b)
 
 
 @dataclass(frozen=True, eq=False)
@@ -56,13 +66,13 @@ class Load:
     r"""An object that is moved along the path: contacts, weight and inertia at every grid point.
 
     Attributes:
-        problems: (17) at rest, at each of the K grid points; their objectives do not count.
-        w_a_O, w_b_O: The wrench that accelerates the object, in its frame, is
-            :math:`w_a a + w_b b` [N, N·m], (K, 6).
-        w_a_B, w_b_B: The same about the point B of each problem; not to be given.
+        problems: (17) at rest at each of the K grid points; their objectives are not used.
+        w_a_O, w_b_O: Coefficients of the wrench :math:`w_a a + w_b b` that accelerates the object,
+            in its frame [N, N·m], (K, 6).
+        w_a_B, w_b_B: The same about the point B of each problem; derived.
 
     Raises:
-        InvalidInputError: Shapes differ, or the problems are not of one structure.
+        InvalidInputError: Shapes differ, or the problems differ in structure.
     """
 
     problems: tuple[Problem, ...]
@@ -75,23 +85,55 @@ class Load:
         points = len(self.problems)
         if not points:
             raise InvalidInputError("load.problems", "none", "one for every grid point")
-        check_array("load.w_a_O", self.w_a_O, (points, 6))
-        check_array("load.w_b_O", self.w_b_O, (points, 6))
-        for name, w_O in (("w_a_B", self.w_a_O), ("w_b_B", self.w_b_O)):
+        for axis in "ab":
+            w_O = getattr(self, f"w_{axis}_O")
+            checks.array(f"load.w_{axis}_O", w_O, (points, 6))
             pairs = zip(self.problems, w_O, strict=True)
-            object.__setattr__(self, name, np.array([p.about_B(w) for p, w in pairs]))
+            object.__setattr__(self, f"w_{axis}_B", np.array([p.about_B(w) for p, w in pairs]))
         first = self.problems[0]
         for k, problem in enumerate(self.problems):
             same = problem.contacts == first.contacts
-            same &= (problem.joints is None) == (first.joints is None)
-            if same and problem.joints is not None and first.joints is not None:
-                same = problem.joints.names == first.joints.names
-                for bound in ("tau_min", "tau_max"):
-                    finite = np.isfinite(getattr(problem.joints, bound))
-                    same &= bool((finite == np.isfinite(getattr(first.joints, bound))).all())
-            if not same:
+            if not same or _kind(problem.joints) != _kind(first.joints):
                 valid = "the contacts, joints and kinds of limits of the first"
                 raise InvalidInputError(f"load.problems[{k}]", "another structure", valid)
+
+    @cached_property
+    def unit(self) -> float:
+        """Return the largest load of all grid points, or 1 without load [N or N·m]."""
+        return max(problem.load for problem in self.problems) or 1.0
+
+    @cached_property
+    def G(self) -> Array:
+        """Return the grasp maps about B, (K, m, 6, 6)."""
+        return np.stack([problem.G for problem in self.problems])
+
+    @cached_property
+    def w_ext_B(self) -> Array:
+        """Return the external wrench at rest about B [N, N·m], (K, 6)."""
+        return np.stack([problem.w_ext_B for problem in self.problems])
+
+    @cached_property
+    def joints(self) -> tuple[Joints, ...]:
+        """Return the joints at each grid point; empty without joints."""
+        return tuple(p.joints for p in self.problems if p.joints is not None)
+
+    @cached_property
+    def tau_min(self) -> Array:
+        """Return the lower torque limits [N·m or N], (K, l)."""
+        return np.stack([joints.tau_min for joints in self.joints])
+
+    @cached_property
+    def tau_max(self) -> Array:
+        """Return the upper torque limits [N·m or N], (K, l)."""
+        return np.stack([joints.tau_max for joints in self.joints])
+
+
+def _kind(joints: Joints | None) -> object:
+    """Return the names of joints and which of their limits are finite."""
+    if joints is None:
+        return None
+    limits = np.concatenate([joints.tau_min, joints.tau_max])
+    return joints.names, np.isfinite(limits).tobytes()
 
 
 @dataclass(frozen=True, eq=False)
@@ -108,29 +150,29 @@ class PathProblem:
                                  \|x_q' a + x_q'' b\| \le x_{q,max} \\
                                & \textstyle\int ds / \sqrt b \le T
 
-    at both ends of every interval of the grid, each with that interval's a: accelerations, and with
-    them forces, jump at grid points. With a single grid point a = b = 0, and it is (17).
+    at both ends of every interval of the grid, with that interval's a. Accelerations and forces
+    jump at grid points. With a single grid point a = b = 0, and the problem is (17).
 
-    Several loads are an uncertain object: a and b and the normal forces of the hands serve all of
-    them, while friction and the environment's forces are each load's own.
+    Several loads represent an uncertain object: a, b and the normal forces of the hands are common
+    to all loads; tangential forces and the environment's forces may differ.
 
     Objectives: the duration; the mean over the path of the sum of squared torque utilisations
     :math:`2\tau / (\tau_{max} - \tau_{min})`; the largest friction utilisation.
 
     Attributes:
         s: The K grid points, increasing.
-        loads: One or several.
-        inertial_torques: Of the robot; None without joints.
+        loads: One or several loads.
+        inertial_torques: Torques that the robot's motion needs; None without joints.
         rates: Speed limits.
         accelerations: Acceleration limits.
         objective: Phi.
         duration: Largest duration T [s]; may be infinite.
         start_rate, end_rate: :math:`\dot s` at both ends [1/s].
-        timing: b at the grid points [1/s^2], (K,), where the timing is given and forces alone are
-            sought, with all limits but those of rates, accelerations and duration; else None.
+        timing: Given b at the grid points [1/s^2], (K,), or None. If given, only forces are sought,
+            and limits of rates, accelerations and duration do not apply.
 
     Raises:
-        InvalidInputError: A field is non-finite, mis-shaped or senseless.
+        InvalidInputError: A field is not finite, has a wrong shape or contradicts another.
     """
 
     s: Array
@@ -146,7 +188,7 @@ class PathProblem:
 
     def __post_init__(self) -> None:
         points = len(self.s)
-        check_array("s", self.s, (points,))
+        checks.array("s", self.s, (points,))
         if not points or (np.diff(self.s) <= 0.0).any():
             raise InvalidInputError("s", "numbers that do not increase", "an increasing grid")
         if not self.loads:
@@ -158,69 +200,61 @@ class PathProblem:
             self._check_alike(i, load.problems[0])
         self._check_torques(points)
         if self.rates is not None:
-            check_array("rates.slopes", self.rates.slopes, (points, len(self.rates.names)))
+            checks.shape("rates.slopes", self.rates.slopes, (points, len(self.rates.names)))
         if self.accelerations is not None and len(self.accelerations.slopes) != points:
             given = f"{len(self.accelerations.slopes)} points"
             raise InvalidInputError("accelerations.slopes", given, f"{points} points")
-        for name in ("start_rate", "end_rate"):
-            value = getattr(self, name)
-            if not (math.isfinite(value) and value >= 0.0):
-                raise InvalidInputError(name, value, "a finite rate >= 0 1/s")
+        checks.not_negative("start_rate", self.start_rate)
+        checks.not_negative("end_rate", self.end_rate)
         if not self.duration > 0.0:
             raise InvalidInputError("duration", self.duration, "a time > 0 s")
         if self.timing is not None:
-            check_array("timing", self.timing, (points,))
+            checks.array("timing", self.timing, (points,))
             if (self.timing[1:-1] <= 0.0).any() or (self.timing < 0.0).any():
                 raise InvalidInputError("timing", "rests on the way", "positive between the ends")
             if self.objective is PathObjective.LEAST_TIME:
                 raise InvalidInputError("objective", self.objective, "one of forces, with a timing")
         elif self.objective.needs_duration and points > 1 and not math.isfinite(self.duration):
-            asks = f"a finite time > 0 s, as objective {self.objective} asks"
-            raise InvalidInputError("duration", self.duration, asks)
+            raise InvalidInputError("duration", self.duration, f"a finite time > 0 s, {self._asks}")
+
+    @property
+    def _asks(self) -> str:
+        return f"as objective {self.objective} asks"
 
     def _check_alike(self, index: int, problem: Problem) -> None:
-        """Refuses a load whose hands or joints are not those of the first load."""
+        """Check that a load has the hands and joints of the first load."""
         first = self.loads[0].problems[0]
         names = [[p.contacts[i].name for i in p.hands] for p in (problem, first)]
         joints = [() if p.joints is None else p.joints.names for p in (problem, first)]
         if names[0] != names[1] or joints[0] != joints[1]:
             valid = "the hands and joints of the first load"
             raise InvalidInputError(f"loads[{index}]", "other hands or joints", valid)
-        if self.objective is PathObjective.FRICTION_MARGIN and all(
-            c.model is ContactModel.FRICTIONLESS for c in problem.contacts
-        ):
-            raise InvalidInputError(
-                "contacts", "no friction", f"friction, as objective {self.objective} asks"
-            )
+        margin = self.objective is PathObjective.FRICTION_MARGIN
+        if margin and not problem.contact_set.rough.any():
+            raise InvalidInputError("contacts", "no friction", f"friction, {self._asks}")
 
     def _check_torques(self, points: int) -> None:
-        joints = self.loads[0].problems[0].joints
+        joints, torques = self.loads[0].problems[0].joints, self.inertial_torques
+        effort = self.objective is PathObjective.LEAST_EFFORT
         if joints is None:
-            if self.inertial_torques is not None:
+            if torques is not None:
                 raise InvalidInputError("inertial_torques", "torques", "None without joints")
-            if self.objective is PathObjective.LEAST_EFFORT:
-                raise InvalidInputError("joints", None, f"joints, as {self.objective} asks")
+            if effort:
+                raise InvalidInputError("joints", None, f"joints, {self._asks}")
             return
-        if self.inertial_torques is None:
+        if torques is None:
             raise InvalidInputError("inertial_torques", None, "torques, as there are joints")
-        check_array(
-            "inertial_torques.tau_a", self.inertial_torques.tau_a, (points, len(joints.names))
-        )
-        if self.objective is PathObjective.LEAST_EFFORT:
-            usable = np.isfinite(joints.tau_min) & np.isfinite(joints.tau_max)
-            usable &= joints.tau_min < joints.tau_max
-            if not usable.all():
-                worst = joints.names[int(np.argmin(usable))]
-                asks = f"finite with tau_min < tau_max, as objective {self.objective} asks"
-                raise InvalidInputError(f"limits of {worst}", "no finite range", asks)
+        checks.shape("inertial_torques.tau_a", torques.tau_a, (points, len(joints.names)))
+        usable = np.isfinite(joints.tau_min) & np.isfinite(joints.tau_max)
+        usable &= joints.tau_min < joints.tau_max
+        if effort and not usable.all():
+            worst = joints.names[int(np.argmin(usable))]
+            asks = f"finite with tau_min < tau_max, {self._asks}"
+            raise InvalidInputError(f"limits of {worst}", "no finite range", asks)
 
     def at(self, points: Indices) -> PathProblem:
-        """The same path on fewer of its grid points, by their indices."""
-
+        """Return the same path on some of its grid points, by index."""
         torques, rates, limited = self.inertial_torques, self.rates, self.accelerations
-        if torques is not None:
-            parts = (torques.tau_a, torques.tau_b, torques.tau_c)
-            torques = InertialTorques(*(tau[points] for tau in parts))
         if rates is not None:
             rates = replace(rates, slopes=rates.slopes[points])
         if limited is not None:
@@ -233,17 +267,17 @@ class PathProblem:
                 Load(tuple(e.problems[k] for k in points), e.w_a_O[points], e.w_b_O[points])
                 for e in self.loads
             ),
-            inertial_torques=torques,
+            inertial_torques=None if torques is None else torques.at(points),
             rates=rates,
             accelerations=limited,
             timing=None if self.timing is None else self.timing[points],
         )
 
     @property
-    def stations(self) -> Array:
-        """Grid point and interval of every place where the constraints hold, (S, 2) integers.
+    def stations(self) -> Indices:
+        """Return grid point and interval of every place with constraints, (S, 2) integers.
 
-        Both ends of every interval in order. A single grid point is a rest; its interval is -1.
+        These are both ends of every interval, in order. A single grid point has the interval -1.
         """
         intervals = np.arange(len(self.s) - 1)
         if not len(intervals):
@@ -252,7 +286,7 @@ class PathProblem:
         return np.array(both).transpose(2, 0, 1).reshape(-1, 2)
 
     def timescale(self) -> float:
-        """A time in which the path may be covered [s], for units: by speeds, or else by inertia."""
+        """Return a typical duration [s], as a unit: from the limits of duration, speed or force."""
         if math.isfinite(self.duration):
             return self.duration
         if len(self.s) < 2:

@@ -1,4 +1,4 @@
-"""A path's timing and forces as found, with residuals that are computed without the solver."""
+"""Timing and forces of a path, with residuals that are computed without the solver."""
 
 from __future__ import annotations
 
@@ -10,20 +10,20 @@ import numpy as np
 
 from fulcrum.synthesis import FulcrumError
 from fulcrum.synthesis.arrays import Array, N
-from fulcrum.synthesis.contact import ContactSet, utilisation
+from fulcrum.synthesis.contact import utilisation
 from fulcrum.synthesis.path.problem import PathProblem
 
-# From this share of a limit on a constraint counts as active.
+# Share of a limit from which on a constraint counts as active.
 ACTIVE = 0.999
 
 
 @dataclass(frozen=True)
 class PathResiduals:
-    """How well a solution keeps the path problem and its optimality conditions.
+    """Residuals of the path problem and of its optimality conditions.
 
     Attributes:
-        primal: Largest imbalance of the object as a share of the largest load, or excess over a
-            limit as a share of it [-]; viscous friction by the exact rate.
+        primal: Largest imbalance as a share of the largest load, or excess over a limit as a share
+            of it [-]; viscous friction by the exact rate.
         dual: Largest violation of stationarity and dual cones, in the solver's units [-].
         gap: |primal value - dual value| relative to the value [-].
     """
@@ -40,10 +40,10 @@ class PathSolution:
     Stations are the ends of the intervals, see :attr:`PathProblem.stations`.
 
     Attributes:
-        problem: What was solved.
+        problem: The problem that was solved.
         value: Optimal objective: duration [s], mean squared effort [-] or friction utilisation [-].
         b: Squared rate of s at the grid points [1/s^2], (K,).
-        w_OC_C: Wrenches with each load, on it, in contact axes [N, N·m], (S, m, 6).
+        w_OC_C: Wrenches on each load in contact axes [N, N·m], (S, m, 6).
         dual, gap: See :class:`PathResiduals`.
         iterations: Interior-point iterations, summed over all solves.
         solve_s: Time inside the solver, set-up included [s].
@@ -60,51 +60,47 @@ class PathSolution:
 
     @cached_property
     def a(self) -> Array:
-        """Acceleration of s in each interval [1/s^2], (K - 1,)."""
+        """Return the acceleration of s in each interval [1/s^2], (K - 1,)."""
         return np.diff(self.b) / (2.0 * np.diff(self.problem.s))
 
     @cached_property
     def times(self) -> Array:
-        """When each grid point is reached [s], (K,)."""
+        """Return the time at which each grid point is reached [s], (K,)."""
         rate = np.sqrt(self.b)
         steps = 2.0 * np.diff(self.problem.s) / (rate[:-1] + rate[1:])
         return np.concatenate([[0.0], np.cumsum(steps)])
 
     @property
     def duration(self) -> float:
-        """Duration of the whole path [s]."""
+        """Return the duration of the whole path [s]."""
         return float(self.times[-1])
 
     @cached_property
     def motion(self) -> tuple[Array, Array]:
-        """a and b at the stations [1/s^2], (S,) each."""
+        """Return a and b at the stations [1/s^2], (S,) each."""
         point, interval = self.problem.stations.T
         return np.append(self.a, 0.0)[interval], self.b[point]
 
     @cached_property
     def tau(self) -> tuple[Array, ...]:
-        """Joint torques [N·m or N] with each load, (S, l) each; empty without joints."""
-        point = self.problem.stations[:, 0]
-        a, b = self.motion
+        """Return the joint torques with each load [N·m or N], (S, l); empty without joints."""
+        point, own = self.problem.stations[:, 0], self.problem.inertial_torques
         found = []
         for load, w_OC_C in zip(self.problem.loads, self.w_OC_C, strict=True):
             still = [load.problems[k].torque(w) for k, w in zip(point, w_OC_C, strict=True)]
-            tau, own = np.array(still), self.problem.inertial_torques
-            if own is not None:
-                tau = tau + own.tau_a[point] * a[:, None] + own.tau_b[point] * b[:, None]
-                tau = tau + own.tau_c[point] * np.sqrt(b)[:, None]
-            found.append(tau)
+            tau = np.array(still)
+            found.append(tau if own is None else own.at(point).added_to(tau, *self.motion))
         return tuple(found)
 
     @cached_property
     def utilisation(self) -> tuple[Array, ...]:
-        """Friction utilisation of each contact [-], (S, m), with each load."""
+        """Return the friction utilisation of each contact [-], (S, m), with each load."""
         pairs = zip(self.problem.loads, self.w_OC_C, strict=True)
         return tuple(utilisation(load.problems[0].contacts, w) for load, w in pairs)
 
     @cached_property
     def shares(self) -> dict[str, Array]:
-        """How much of each limit is used [-], (S,), by its name; with the load that uses most."""
+        """Return the used share of each limit [-], (S,), by name, with the load that uses most."""
         found: dict[str, Array] = {}
         for i in range(len(self.problem.loads)):
             for name, share in self.shares_with(i).items():
@@ -117,16 +113,14 @@ class PathSolution:
         if (limited := self.problem.accelerations) is not None:
             vectors = limited.slopes[point] * a[:, None, None]
             vectors = vectors + limited.curvatures[point] * b[:, None, None]
-            sizes = np.linalg.norm(vectors, axis=2) / limited.limits
-            found |= {
-                f"acceleration of {n}": s for n, s in zip(limited.names, sizes.T, strict=True)
-            }
+            sizes = (np.linalg.norm(vectors, axis=2) / limited.limits).T
+            found |= {f"acceleration of {n}": s for n, s in zip(limited.names, sizes, strict=True)}
         return found
 
     def shares_with(self, i: int) -> dict[str, Array]:
-        """The same of forces and torques with one load, by its index."""
+        """Return the used shares of the limits of forces and torques with load i [-], (S,)."""
         load, point, w_OC_C = self.problem.loads[i], self.problem.stations[:, 0], self.w_OC_C[i]
-        facts = ContactSet.of(load.problems[0].contacts)
+        facts = load.problems[0].contact_set
         found = {}
         for j, contact in enumerate(load.problems[0].contacts):
             found[f"friction of {contact.name}"] = self.utilisation[i][:, j]
@@ -135,42 +129,35 @@ class PathSolution:
                 found[f"f_n_min of {contact.name}"] = 2.0 - f_n / facts.f_n_min[j]
             if np.isfinite(facts.f_n_max[j]):
                 found[f"f_n_max of {contact.name}"] = f_n / facts.f_n_max[j]
-        first = load.problems[0].joints
-        for j, name in enumerate(() if first is None else first.names):
-            joints = [load.problems[k].joints for k in point]
-            tau = self.tau[i][:, j]
-            low = np.array([each.tau_min[j] for each in joints if each is not None])
-            high = np.array([each.tau_max[j] for each in joints if each is not None])
+        if load.joints:
+            tau, low, high = self.tau[i], load.tau_min[point], load.tau_max[point]
             middle = np.where(np.isfinite(low + high), (low + high) / 2.0, 0.0)
-            up, down = (tau - middle) / (high - middle), (middle - tau) / (middle - low)
-            found[f"torque of {name}"] = np.maximum(up, down)
+            used = np.maximum((tau - middle) / (high - middle), (middle - tau) / (middle - low))
+            found |= {f"torque of {n}": used[:, j] for j, n in enumerate(load.joints[0].names)}
         return found
 
     def active(self) -> list[tuple[str, ...]]:
-        """Names of the limits that are used up, at each of the S stations."""
+        """Return the names of the limits that are used up, at each of the S stations."""
         used = np.array(list(self.shares.values())) >= ACTIVE
         names = np.array(list(self.shares))
         return [tuple(map(str, names[column])) for column in used.T]
 
     @cached_property
     def residuals(self) -> PathResiduals:
-        """The proof: residuals of the constraints and of the optimality conditions."""
+        """Return the residuals of the constraints and of the optimality conditions."""
         excess = max((float(share.max()) - 1.0 for share in self.shares.values()), default=0.0)
         late = self.duration / self.problem.duration - 1.0
         return PathResiduals(max(excess, late, self.imbalance), self.dual, self.gap)
 
     @cached_property
     def imbalance(self) -> float:
-        """Largest imbalance of an object as a share of its largest load [-]."""
+        """Return the largest imbalance of an object as a share of its largest load [-]."""
         a, b = self.motion
         point, worst = self.problem.stations[:, 0], 0.0
         for load, w_OC_C in zip(self.problem.loads, self.w_OC_C, strict=True):
-            G = np.stack([load.problems[k].G for k in point])
-            w_ext = np.stack([load.problems[k].w_ext_B for k in point])
-            balance = np.einsum("smkj,smj->sk", G, w_OC_C) + w_ext
+            balance = np.einsum("smkj,smj->sk", load.G[point], w_OC_C) + load.w_ext_B[point]
             balance -= load.w_a_B[point] * a[:, None] + load.w_b_B[point] * b[:, None]
-            unit = max(problem.load for problem in load.problems) or 1.0
-            worst = max(worst, float(np.abs(balance).max()) / unit)
+            worst = max(worst, float(np.abs(balance).max()) / load.unit)
         return worst
 
 
@@ -178,7 +165,7 @@ class InfeasiblePathError(FulcrumError):
     """No timing and forces satisfy all constraints along the path.
 
     Attributes:
-        binding: The limits that weigh most in the proof, each with its place s on the path.
+        binding: The limits with the largest multipliers, each with its place s on the path.
     """
 
     def __init__(self, binding: list[tuple[str, float]]) -> None:

@@ -1,46 +1,46 @@
-r"""Solves path problems on Clarabel, to its full accuracy, and proves what it says.
+r"""Solves path problems on Clarabel to its full accuracy, with residuals or a proof.
 
-The friction margin is found as in :mod:`synthesis.synthesizer`, by Dinkelbach's method, here with
-the utilisations of all contacts at all stations as its ratios.
+The friction margin is found by Dinkelbach's method as in :mod:`synthesis.friction_margin`, here
+with the utilisations of all contacts at all stations as the ratios.
 """
 
 from __future__ import annotations
 
 import time
-from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
 import clarabel
 import numpy as np
 
-from fulcrum.synthesis import ContactModel, SolverError, UnboundedError
+from fulcrum.synthesis import SolverError, UnboundedError
 from fulcrum.synthesis.arrays import Array, N
 from fulcrum.synthesis.path.form import PathForm
 from fulcrum.synthesis.path.problem import PathObjective, PathProblem
 from fulcrum.synthesis.path.solution import InfeasiblePathError, PathSolution
 from fulcrum.synthesis.solver import SOLVED, fallback_settings, solver_settings
 
-# How far limits may be exceeded before the problem is solved again about the last timing, with its
-# viscous friction, as a share [-]; and how often that may be.
+# Largest excess over a limit, as a share [-]; above it the problem is solved again with the viscous
+# friction of the last timing, up to this many times.
 _EXCESS = 1e-6
 _SOLVES = 10
-# The least improvement of the friction utilisation that is worth another solve [-].
+# Smallest improvement of the friction utilisation for another solve [-].
 _MARGIN_TOLERANCE = 1e-4
 _MARGIN_SOLVES = 30
-# Normal forces below this share of the largest load count as none: their cones are noise.
+# Normal forces below this share of the largest load count as zero: their cones are noise.
 _LOADED = 1e-6
-# A proof of infeasibility: violation of its conditions relative to what it proves.
+# Largest violation of the conditions of a proof of infeasibility, relative to its value.
 _PROVEN = 1e-6
+# Number of limits that an error names.
 _NAMED = 3
 
 
 def solve_path(problem: PathProblem) -> PathSolution:
-    """The optimal timing and forces.
+    """Return the optimal timing and forces.
 
     Raises:
-        InfeasiblePathError: No timing and forces satisfy the constraints; says where and which.
-        UnboundedError: The objective improves without limit, as with a grip that nothing bounds.
-        SolverError: The solver gave neither, or repeated solves do not settle viscous friction.
+        InfeasiblePathError: No timing and forces satisfy the constraints; names limits and places.
+        UnboundedError: The objective improves without limit, for example without a grip limit.
+        SolverError: The solver found neither, or repeated solves do not settle viscous friction.
     """
     found = _optimum(PathForm(problem))
     iterations, solve_s = found.iterations, found.solve_s
@@ -62,11 +62,11 @@ def _optimum(form: PathForm) -> PathSolution:
 
 @dataclass(frozen=True, eq=False)
 class Found:
-    """One solve.
+    """The result of one solve.
 
     Attributes:
         every: All variables.
-        least: The objective in the solver's units.
+        least: Objective in the solver's units.
         dual, gap: See :class:`PathResiduals`.
         iterations: Interior-point iterations.
         solve_s: Time inside the solver [s].
@@ -80,7 +80,7 @@ class Found:
     solve_s: float
 
     def solution(self, form: PathForm, value: float) -> PathSolution:
-        """The same by its names, with a value of the objective."""
+        """Return the solution of a form, with a value of its objective."""
         return PathSolution(
             problem=form.problem,
             value=value,
@@ -96,52 +96,42 @@ class Found:
 def solve_form(
     form: PathForm, utilisation: float, slack: list[Array] | None, accepted: tuple[str, ...]
 ) -> Found:
-    """One solve of a form.
+    """Solve a form once.
 
     Args:
         form: The form.
         utilisation, slack: See :meth:`PathForm.matrices`.
-        accepted: What the solver may say of an answer.
+        accepted: Statuses of the solver that count as a solution.
 
     Raises:
-        InfeasiblePathError: There is none; says where and which limits.
+        InfeasiblePathError: There is no solution; names limits and places.
         UnboundedError: The objective improves without limit.
-        SolverError: The solver gave neither.
+        SolverError: The solver found neither.
     """
     A, h = form.matrices(utilisation, slack)
     started = time.perf_counter()
     iterations = 0
     status = ""
-    for settings in _settings():
+    # Without iterative refinement takes half the time, and the solver stops by true residuals.
+    quick = solver_settings()
+    quick.iterative_refinement_enable = False
+    for settings in (quick, solver_settings(), *fallback_settings()):
         result = clarabel.DefaultSolver(form.P, form.q, A, h, form.rows.cones, settings).solve()
         iterations += result.iterations
-        status = str(result.status)
-        z = np.array(result.z)
-        match status:
-            case "PrimalInfeasible":
-                raise _proof(form, A, h, z)
-            case "DualInfeasible":
-                raise UnboundedError(form.problem.objective)
-            case accurate if accurate in accepted:
-                x = np.array(result.x)
-                solve_s = time.perf_counter() - started
-                dual, gap = _optimality(form, A, h, x, z)
-                least = float(form.q @ x)
-                return Found(form.completed(x), least, dual, gap, iterations, solve_s)
+        status, z = str(result.status), np.array(result.z)
+        if status == "PrimalInfeasible":
+            raise _proof(form, A, h, z)
+        if status == "DualInfeasible":
+            raise UnboundedError(form.problem.objective)
+        if status in accepted:
+            x, solve_s = np.array(result.x), time.perf_counter() - started
+            residuals = _optimality(form, A, h, x, z)
+            return Found(form.completed(x), float(form.q @ x), *residuals, iterations, solve_s)
     raise SolverError(status)
 
 
-def _settings() -> Iterator[clarabel.DefaultSettings]:
-    """First without iterative refinement, in half the time: the solver stops by true residuals."""
-    quick = solver_settings()
-    quick.iterative_refinement_enable = False
-    yield quick
-    yield solver_settings()
-    yield from fallback_settings()
-
-
 def _optimality(form: PathForm, A: Array, h: Array, x: Array, z: Array) -> tuple[float, float]:
-    """Violation of stationarity and dual cones, and the gap relative to the value."""
+    """Return the violation of stationarity and dual cones, and the gap relative to the value."""
     quadratic = form.P @ x
     stationarity = float(np.abs(quadratic + form.q + A.T @ z).max())
     primal, dual = 0.5 * x @ quadratic + form.q @ x, -0.5 * x @ quadratic - h @ z
@@ -150,7 +140,7 @@ def _optimality(form: PathForm, A: Array, h: Array, x: Array, z: Array) -> tuple
 
 
 def _proof(form: PathForm, A: Array, h: Array, z: Array) -> InfeasiblePathError:
-    """What a ray of multipliers proves: the limits that weigh most, and where."""
+    """Return the error that a ray of multipliers proves, with the heaviest limits and places."""
     value = -float(h @ z)
     violation = max(float(np.abs(A.T @ z).max()), form.rows.dual_violation(z))
     if not violation <= _PROVEN * value:
@@ -164,7 +154,7 @@ def _proof(form: PathForm, A: Array, h: Array, z: Array) -> InfeasiblePathError:
 
 
 def _largest_margin(form: PathForm) -> PathSolution:
-    """Dinkelbach's method; every iterate is feasible, so that stopping early costs margin only."""
+    """Apply Dinkelbach's method; every iterate is feasible, so stopping early only costs margin."""
     found = solve_form(form, 1.0, None, SOLVED)
     best = found.solution(form, 0.0)
     iterations, solve_s = found.iterations, found.solve_s
@@ -188,12 +178,11 @@ def _largest_margin(form: PathForm) -> PathSolution:
 
 
 def _largest_utilisation(form: PathForm, found: PathSolution) -> tuple[float, list[Array]]:
-    """The largest utilisation of loaded contacts, and the normal forces of those, (S, m) each."""
+    """Return the largest utilisation of loaded contacts, and their normal forces, (S, m) each."""
     worst, slack = 0.0, []
     for load, w_OC_C, used in zip(form.problem.loads, found.w_OC_C, found.utilisation, strict=True):
         f_n = w_OC_C[..., N]
-        rough = [c.model is not ContactModel.FRICTIONLESS for c in load.problems[0].contacts]
-        loaded = (f_n > _LOADED * form.unit) & np.array(rough)
+        loaded = (f_n > _LOADED * form.unit) & load.problems[0].contact_set.rough
         worst = max(worst, float(used[loaded].max(initial=0.0)))
         slack.append(np.where(loaded, f_n, 0.0))
     return worst, slack

@@ -1,4 +1,4 @@
-"""Grips that serve every world of an uncertainty set, and proofs that none does."""
+"""Grips that serve every world of an uncertainty set, and proofs that no grip does."""
 
 from fulcrum.synthesis.robust.certificate import RobustInfeasibleError
 from fulcrum.synthesis.robust.grip import robust_grip

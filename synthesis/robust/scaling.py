@@ -1,9 +1,9 @@
-r"""How much uncertainty one grip can bear: the largest factor on the set with which forces exist.
+r"""The largest factor on a set of uncertainties for which one grip exists.
 
-The sets of a smaller factor lie within those of a larger one (:meth:`UncertaintySet.scaled`), and a
-grip that serves a set serves every part of it, so that the feasible factors are an interval from 0
-up, whose end is bisected. Friction multiplies forces; the end is no optimum of one conic program.
-Contact places, whose sets are not exactly convex, may blur it in the second order of their offset.
+The set of a smaller factor is part of that of a larger one (:meth:`UncertaintySet.scaled`), and a
+grip that serves a set serves every part of it. So the feasible factors are an interval from 0 up,
+whose end is bisected: friction multiplies forces, so it is not the optimum of one conic program.
+Sets of contact places are not exactly convex, with an error of second order in their offset.
 """
 
 from __future__ import annotations
@@ -17,9 +17,9 @@ from fulcrum.synthesis.robust.certificate import RobustCertificate, RobustInfeas
 from fulcrum.synthesis.robust.grip import RobustGrip, robust_grip
 from fulcrum.synthesis.robust.uncertainty_set import UncertaintySet
 
-# The last interval of the bisection, relative to where it starts: below any set's own precision.
+# Last interval of the bisection, relative to the first: less than the precision of any set.
 _BISECTED = 1e-3
-# How near to the factor at which nothing is left of mass or friction is tried, relative.
+# Relative distance from the factor at which no mass or friction is left.
 _SHARE_LEFT = 1e-3
 
 
@@ -28,11 +28,11 @@ class Scaling:
     """The largest scaling of a set of uncertainties that one grip serves.
 
     Attributes:
-        factor: For which the grip is verified in every world [-].
-        infeasible_from: Above it, the least factor that was proven infeasible [-]; infinite if the
-            largest that was tried is feasible.
-        grip: For ``factor``.
-        certificate: Proof for ``infeasible_from``, which says what limits; None if infinite.
+        factor: Factor for which the grip is verified in every world [-].
+        infeasible_from: Least factor that was proven infeasible [-]; infinite if the largest tried
+            factor is feasible.
+        grip: Grip for ``factor``.
+        certificate: Proof for ``infeasible_from``; None if that is infinite.
     """
 
     factor: float
@@ -44,18 +44,18 @@ class Scaling:
 def largest_scaling(
     problem: Problem, gravity: Gravity, uncertainty: UncertaintySet, most: float = 4.0
 ) -> Scaling:
-    """Bisects the factor between 0 and ``most``; what the solver cannot decide is not borne.
+    """Return the largest factor up to ``most``; undecided factors count as infeasible.
 
     Args:
         problem: The nominal world.
-        gravity: The weight, which its external wrench contains.
-        uncertainty: The set whose factor is 1.
-        most: The largest factor to try [-]; it is lowered to keep some mass and friction.
+        gravity: The weight, which is part of its external wrench.
+        uncertainty: The set with the factor 1.
+        most: Largest factor to try [-]; lowered so that some mass and friction remain.
 
     Raises:
-        InvalidInputError: The problem's objective is no function of the hands' normal forces.
-        RobustInfeasibleError: Even the nominal world is infeasible.
-        SolverError: The solver could not decide about the nominal world.
+        InvalidInputError: The problem's objective is not a function of the hands' normal forces.
+        RobustInfeasibleError: The nominal world is infeasible.
+        SolverError: The solver could not decide whether the nominal world is feasible.
     """
 
     def attempt(factor: float) -> RobustGrip | RobustCertificate | None:

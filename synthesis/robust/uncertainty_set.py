@@ -1,4 +1,4 @@
-r"""What is not known of object and contacts, as a set of worlds that one grip has to serve.
+r"""The unknown properties of object and contacts, as a set of worlds that one grip must serve.
 
 The external wrench of (17) is that of the weight W along the unit vector g at the centre of mass c,
 plus that of a push f at a point r:
@@ -6,15 +6,15 @@ plus that of a push f at a point r:
 .. math:: w_{ext} = W\,(g,\ c \times g) + (f,\ r \times f)
 
 Both terms range over convex hulls of few wrenches. W and each component of c range over intervals,
-and the first term is linear in each of them alone; so it is extreme at their corners, less those
-within the hull of the others (moving c along g does nothing). Pushes are extreme along one of the
-object's axes, at the point farthest off along another. Worlds with every sum of the two, and the
-lowest friction, stand for all in between (:mod:`synthesis.robust.grip`).
+and the first term is linear in each of them alone. So it is extreme at their corners, except those
+within the hull of the others (moving c along g has no effect). Pushes are extreme along one of the
+object's axes, at the farthest point along another. Worlds with every sum of the two, and the lowest
+friction, represent all worlds in between (:mod:`synthesis.robust.grip`).
 
-A hand that touches elsewhere multiplies forces by its offset d. The moment of its normal force
-n f_n is :math:`f_n\, d \times n`; of all combinations of the hands' offsets along their tangents
-those are taken whose moments are extreme for equal normal forces. The much smaller moments of the
-tangential forces make no set that is exactly convex.
+A hand that touches at an offset d adds the moment :math:`f_n\, d \times n` of its normal force
+n f_n. Of all combinations of the hands' offsets along their tangents, those with extreme moments
+for equal normal forces are used. With the much smaller moments of the tangential forces the set is
+not exactly convex.
 """
 
 from __future__ import annotations
@@ -27,19 +27,19 @@ from typing import Annotated
 import numpy as np
 from scipy.spatial import ConvexHull, QhullError
 
-from fulcrum.synthesis import Contact, ContactModel, InvalidInputError, Joints, Problem
+from fulcrum.synthesis import Contact, InvalidInputError, Problem
 from fulcrum.synthesis.arrays import Array, Indices, N, Vector
 from fulcrum.synthesis.contact import skew
 from fulcrum.synthesis.problem import Gravity
 from fulcrum.synthesis.settings import Fraction, Key, NotNegative, Settings, Spread3
 
-# Points of a hull that differ by less than this share of its size are one: rounding, and no more.
+# Points of a hull that differ by less than this share of its size are equal up to rounding.
 _SAME = 1e-9
 
 
 @dataclass(frozen=True)
 class UncertaintySet(Settings):
-    """By how much the worlds may differ from the nominal one.
+    """The largest deviations of the worlds from the nominal world.
 
     Raises:
         InvalidInputError: A field is negative or not finite, or a share is not below 1.
@@ -66,17 +66,17 @@ class UncertaintySet(Settings):
 
     @property
     def label(self) -> str:
-        """What errors call the set."""
+        """Return the name of the set in errors."""
         return "uncertainty"
 
     @property
     def largest_factor(self) -> float:
-        """The factor at which a share would reach 1; infinite without shares."""
+        """Return the factor at which a share would reach 1; infinite without shares."""
         share = max(self.mass, self.friction)
         return 1.0 / share if share > 0.0 else math.inf
 
     def scaled(self, factor: float) -> UncertaintySet:
-        """The set with all offsets, shares and pushes multiplied; where pushes act stays.
+        """Return the set with all offsets, shares and pushes multiplied; the lever does not change.
 
         Raises:
             InvalidInputError: The factor is not in [0, largest_factor).
@@ -93,52 +93,43 @@ class UncertaintySet(Settings):
         )
 
     def worlds(self, problem: Problem, gravity: Gravity) -> tuple[Problem, ...]:
-        """The worlds that stand for all of the set.
+        """Return the worlds that represent the whole set.
 
         Args:
             problem: The nominal world.
-            gravity: The weight, which its external wrench contains.
+            gravity: The weight, which is part of its external wrench.
         """
         w_rest = problem.w_ext_O - gravity.wrench_O
-        wrenches = itertools.product(
-            self.placed(problem), self._weights(gravity), self._pushes(gravity)
-        )
+        wrenches = list(itertools.product(self._weights(gravity), self._pushes(gravity)))
         return tuple(
             replace(world, w_ext_O=w_rest + w_weight + w_push)
-            for world, w_weight, w_push in wrenches
+            for world in self.placed(problem)
+            for w_weight, w_push in wrenches
         )
 
     def placed(self, problem: Problem) -> tuple[Problem, ...]:
-        """The problem with the lowest friction, and with the hands at each of their extreme places.
+        """Return the problem with the lowest friction and the hands at each extreme place.
 
-        They are as many for all problems whose contacts are fixed in the object alike.
+        The number of places is the same for all problems with the same contacts on the object.
         """
-        contacts = tuple(self._slippery(contact) for contact in problem.contacts)
+        contacts = tuple(
+            replace(c, mu=(1.0 - self.friction) * c.mu) if c.model.has_friction else c
+            for c in problem.contacts
+        )
         return tuple(self._displaced(problem, contacts, d_C) for d_C in self._offsets(problem))
 
-    def _slippery(self, contact: Contact) -> Contact:
-        if contact.model is ContactModel.FRICTIONLESS:
-            return contact
-        return replace(contact, mu=(1.0 - self.friction) * contact.mu)
-
     def _weights(self, gravity: Gravity) -> Array:
-        """Extreme wrenches of the weight in the object frame, (k, 6)."""
+        """Return the extreme wrenches of the weight in the object frame, (k, 6)."""
         corners = itertools.product((1.0 - self.mass, 1.0 + self.mass), *[(-1.0, 1.0)] * 3)
-        return _extreme(
-            np.array(
-                [
-                    replace(
-                        gravity,
-                        weight=share * gravity.weight,
-                        center_O=gravity.center_O + np.array(self.center) * signs,
-                    ).wrench_O
-                    for share, *signs in corners
-                ]
-            )
-        )
+        wrenches = []
+        for share, *signs in corners:
+            center_O = gravity.center_O + np.array(self.center) * signs
+            weight = share * gravity.weight
+            wrenches.append(replace(gravity, weight=weight, center_O=center_O).wrench_O)
+        return _extreme(np.array(wrenches))
 
     def _pushes(self, gravity: Gravity) -> Array:
-        """Extreme wrenches of pushes in the object frame, (k, 6)."""
+        """Return the extreme wrenches of pushes in the object frame, (k, 6)."""
         pushes = []
         largest, levers = np.diag(self.push), np.diag(self.lever)
         for k, sign in itertools.product(range(3), (-1.0, 1.0)):
@@ -149,7 +140,7 @@ class UncertaintySet(Settings):
         return _extreme(np.array(pushes))
 
     def _offsets(self, problem: Problem) -> Array:
-        """Extreme offsets of the n hand contacts, in their axes [m], (k, n, 3)."""
+        """Return the extreme offsets of the n hand contacts, in their axes [m], (k, n, 3)."""
         hands = len(problem.hands)
         if not self.placement:
             return np.zeros((1, hands, 3))
@@ -163,16 +154,16 @@ class UncertaintySet(Settings):
 
     @staticmethod
     def _displaced(problem: Problem, contacts: tuple[Contact, ...], d_C: Array) -> Problem:
-        """The world with other friction and the hand contacts moved by d_C [m], (n, 3)."""
+        """Return the world with other friction and the hand contacts moved by d_C [m], (n, 3)."""
         hands, joints = list(problem.hands), problem.joints
         p_OC_O = problem.p_OC_O.copy()
         p_OC_O[hands] += np.einsum("hij,hj->hi", problem.R_OC[hands], d_C)
-        return replace(
-            problem,
-            contacts=contacts,
-            p_OC_O=p_OC_O,
-            joints=None if joints is None else _at_offset(joints, d_C),
-        )
+        if joints is not None:
+            # A point at the offset d from a contact moves with v + omega x d.
+            J_C = joints.J_C.copy()
+            J_C[:, :3] -= skew(d_C) @ J_C[:, 3:]
+            joints = replace(joints, J_C=J_C)
+        return replace(problem, contacts=contacts, p_OC_O=p_OC_O, joints=joints)
 
 
 def _times(factor: float, vector: Vector) -> Vector:
@@ -180,19 +171,12 @@ def _times(factor: float, vector: Vector) -> Vector:
     return factor * x, factor * y, factor * z
 
 
-def _at_offset(joints: Joints, d_C: Array) -> Joints:
-    """The joints with the Jacobians of points at offsets d from the contacts: v + omega x d."""
-    J_C = joints.J_C.copy()
-    J_C[:, :3] -= skew(d_C) @ J_C[:, 3:]
-    return replace(joints, J_C=J_C)
-
-
 def _extreme(points: Array) -> Array:
     return points[_extreme_rows(points)]
 
 
 def _extreme_rows(points: Array) -> Indices:
-    """Indices of the points, (k, d), whose convex hull is that of all, in their affine span."""
+    """Return the indices of the points, (k, d), that span the convex hull of all."""
     centred = points - points.mean(axis=0)
     size = np.abs(points).max()
     _, first = np.unique(np.round(centred / (_SAME * size or 1.0)), axis=0, return_index=True)
@@ -207,5 +191,5 @@ def _extreme_rows(points: Array) -> Indices:
         return first[ends]
     try:
         return first[np.sort(ConvexHull(coordinates).vertices)]
-    except QhullError:  # All but flat, its facets are rounding; with all points nothing is lost.
+    except QhullError:  # The hull is almost flat, so its facets are rounding; keep all points.
         return first

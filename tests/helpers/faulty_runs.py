@@ -76,9 +76,11 @@ CASES = {
         ("stop",),
         (BEGIN, BEGIN + 0.1),
     ),
+    # A joint that turns with the tilt. left_s0 squeezes: as the squeeze may move, its torque may
+    # stick with a tilt error of 0.9 deg at most, and is 25 % of the limit off only at 2.1 s.
     "torque stuck": Case(
-        broken(KIND.TORQUE_STUCK, t=1.2, joint="left_s0"),
-        "the motor of left_s0 makes",
+        broken(KIND.TORQUE_STUCK, t=1.2, joint="left_e0"),
+        "the motor of left_e0 makes",
         ("stop",),
         (1.2, 1.8),
     ),

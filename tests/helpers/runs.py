@@ -53,14 +53,12 @@ def slippery(s, share):
 
 
 def softer(s):
-    """Contacts of half the stiffness, whose points so move twice as far as contacts give."""
+    """Contacts of half the stiffness."""
 
     def halved(contact):
         return replace(contact, material=contact.material.scaled(0.5))
 
-    wide = replace(s.tolerances, support_slip_mm=2.0 * s.tolerances.slip_mm)
-    hands, supports = tuple(map(halved, s.hands)), tuple(map(halved, s.supports))
-    return replace(s, hands=hands, supports=supports, tolerances=wide)
+    return replace(s, hands=tuple(map(halved, s.hands)), supports=tuple(map(halved, s.supports)))
 
 
 def without_noslip(s):

@@ -54,7 +54,7 @@ def test_a_folder_is_claimed_once_by_all_who_ask_at_the_same_time(tmp_path):
 def test_a_refused_run_leaves_no_folder(tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     assert main(["run", "box-lift"]) == 1  # no forces exist
-    assert "REFUSED, nothing has moved" in capsys.readouterr().out
+    assert "nothing has moved" in capsys.readouterr().out
     assert list(tmp_path.iterdir()) == []
 
 

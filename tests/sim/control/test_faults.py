@@ -26,7 +26,7 @@ STEP = 0.001
 # What counts as rest in the last 0.2 s [m/s or rad/s]: a light wrist that was turned away creeps
 # back over seconds, for its damping is large against its impedance.
 OBJECT_RESTS, JOINTS_REST = 0.02, 0.5
-LOST_JOINTS = {"torque lost": "left_e0", "torque stuck": "left_s0"}
+LOST_JOINTS = {"torque lost": "left_e0", "torque stuck": "left_e0"}
 
 
 def robot_of(name):

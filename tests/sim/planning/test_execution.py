@@ -10,7 +10,7 @@ import pytest
 
 from fulcrum.scenarios import scenario
 from fulcrum.scenarios.cli import main
-from fulcrum.scenarios.requests import chosen_planning
+from fulcrum.scenarios.functions import chosen_planning
 from fulcrum.sim.planning.execution import Planning, planned_tilt
 from fulcrum.sim.scenario.phases import Phase
 from fulcrum.sim.sweep.design import Sweep
@@ -95,11 +95,13 @@ def test_the_options_of_a_planning_make_it():
     assert chosen_planning(chosen, None, 1.0, 3.0, False) is None
 
 
-# --- planned anew
+# --- held
 
 
-def test_a_held_tilt_goes_on_by_a_new_plan_from_rest():
-    start = execution(BOX, 1.0).joint_path.schedule.starts[execution(BOX, 1.0).phase]
+def test_a_held_tilt_goes_on_from_rest_by_the_same_plan():
+    planned = execution(BOX, 1.0)
+    names = [phase.name for phase in planned.scenario.phases]
+    start = float(planned.joint_path.schedule.starts[names.index("tilt")])
     silence = Fault(FaultKind.SILENCE, start + 0.5, duration_s=0.1)
     result = executed(BOX, 1.0, World(faults=(silence,)))
     assert [e.reaction for e in result.report.events] == ["hold", "run"]
@@ -107,7 +109,7 @@ def test_a_held_tilt_goes_on_by_a_new_plan_from_rest():
     again = result.report.events[-1].t
     trace = result.trace
     after = (trace.t > again) & rows_of(BOX, trace, "tilt")
-    # From rest, with the new plan's acceleration at once, and without a jump of the tilt.
+    # From rest, up to the plan's rate, and without a jump of the tilt.
     assert abs(trace.rate_ref[after][0]) < 0.05
     assert np.diff(trace.tilt_ref).max() < 1.01 * TICK * trace.rate_ref.max()
     assert trace.rate_ref[after].max() > 1.0

@@ -117,7 +117,7 @@ def role_shift(name, case, later=0):
 def test_contacts_without_noslip_carry_the_same_force_by_role_at_every_step(name):
     # How neighbouring points of a rigid edge share their load is left to a slow roll of the object
     # that hardly any force resists: single points differ by 3.5 % (box), their sum by 0.12 %.
-    # Measured 0.02 % until the object comes down (box-wall), then RMSMARK.
+    # Measured 0.02 % until the object comes down (box-wall), then 1.2 % (box-tilt).
     assert role_shift(name, "without noslip", LATER).max() < SAME_FORCE
 
 

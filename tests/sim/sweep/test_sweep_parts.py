@@ -130,6 +130,10 @@ def row(controller, cause, seed, grip=50.0, mass=1.0, friction=1.0):
         "replay": f"fulcrum run --seed {seed}",
         "contacts.left.max_normal_n": grip,
         "contacts.right.max_normal_n": None if grip is None else grip + 1.0,
+        "contacts.left.max_utilisation": 0.8,
+        "contacts.right.max_utilisation": 0.6,
+        "contacts.left.force_error_rms_n": 0.1,
+        "contacts.right.force_error_rms_n": 0.3,
         "world.mass": mass,
         "world.friction": friction,
     }
@@ -149,6 +153,7 @@ def test_scores_count_successes_and_rank_causes():
     ]
     assert margin.causes[0].replay == "fulcrum run --seed 8"
     assert (margin.grip_n, margin.grip_max_n) == (51.0, 51.0)
+    assert (margin.friction, margin.force_error_n) == (0.8, 0.3)
     assert (paper.rate, paper.low, paper.grip_n) == (0.0, 0.0, 0.0)
 
 

@@ -12,7 +12,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from fulcrum.scenarios.requests import (
+from fulcrum.scenarios.functions.requests import (
     Asked,
     as_scenario,
     asked_planning,
