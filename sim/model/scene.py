@@ -133,7 +133,7 @@ def joint_ranges(scene: mujoco.MjModel) -> NDArray[np.float64]:
 
 
 def object_bounds(scenario: Scenario, scene: mujoco.MjModel) -> tuple[Array, Array]:
-    """Return two opposite corners, (3,), of the object's bounding box in its frame [m]."""
+    """Return two opposite corners, (3,), of the bounds of the object's geoms, in its frame [m]."""
     corners = []
     for name in (geom.name for geom in scenario.object.geoms):
         geom = scene.geom(name)

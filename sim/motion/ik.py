@@ -103,7 +103,7 @@ class _Follower:
     def follow(self) -> JointPath:
         phases = self._schedule.phases
         touched = next((i for i, p in enumerate(phases) if p.gap == 0.0), len(phases) - 1)
-        # The posture at the first contact is solved first, the approach backwards from it.
+        # The posture at the first contact is solved first; the approach is planned back from it.
         self._steps = 1 + sum(len(self._targets(i)[1]) - 1 for i in range(len(phases)))
         self._reach(_Target(phases[touched].tilt * self._path.end, phases[touched].gap), None)
         holding = self._configuration.q.copy()
@@ -117,7 +117,7 @@ class _Follower:
         return JointPath(self._schedule, tuple(progress), tuple(q), clearance)
 
     def _follow(self, index: int, backwards: bool = False) -> tuple[Array, Array]:
-        """Return a phase's grid of progresses and the joint angles there, from the present ones."""
+        """Return a phase's grid of progresses and the motors' angles, starting at the present."""
         grid, targets = self._targets(index)
         durations = np.diff(self._schedule.times(index, grid))
         if backwards:

@@ -1,4 +1,4 @@
-"""What is planned before anything moves: problems along the path, robust grip, fast tilts."""
+"""Planning before a run: problems along the path, robust grip, planned tilts."""
 
 from fulcrum.sim.planning.execution import Execution, Planning, made_plan, planned_tilt
 from fulcrum.sim.planning.file import plan_content

@@ -1,4 +1,4 @@
-"""A planned tilt as a run: the plan's timing and grip in the manoeuvre, and its tolerances."""
+"""Runs with a planned tilt: the plan's timing, grip and tolerances in the manoeuvre."""
 
 from __future__ import annotations
 
@@ -18,21 +18,21 @@ from fulcrum.synthesis.arrays import N
 from fulcrum.synthesis.checks import positive
 from fulcrum.synthesis.path import PathObjective
 
-# In which no arm is at its speed limits, and inverse kinematics finds the path alone.
+# Duration at which no arm reaches its speed limits, so that the joint path is purely geometric.
 _SLOW_S = 10.0
 
 
 @dataclass(frozen=True)
 class Planning:
-    """How the tilt of a run is planned, with the margins of the scenario's control.
+    """Options for planning the tilt of a run, with the margins of the scenario's control.
 
     Attributes:
-        stretch: By how much the planned duration is stretched [-].
-        points: Grid points of the plan.
-        objective: What the plan is best for.
-        duration: The longest that it may take before it is stretched [s].
-        robust: Whether it also serves the uncertainty set of controller ``robust``, or as much of
-            that as one grip can.
+        stretch: Factor on the planned duration [-].
+        points: Number of grid points of the plan.
+        objective: Objective of the plan.
+        duration: Longest duration of the plan before it is stretched [s].
+        robust: Whether the plan also holds for the uncertainty set of controller ``robust``, or for
+            the largest share of it that one grip can serve.
     """
 
     stretch: float = 1.0
@@ -48,7 +48,7 @@ class Planning:
 
     @property
     def options(self) -> str:
-        """The options of the command line that say so."""
+        """Options of the command line for this planning."""
         words = [f"--plan {self.objective} --stretch {self.stretch!r}"]
         words += [f"--duration {self.duration!r}"] if math.isfinite(self.duration) else []
         words += ["--robust"] if self.robust else []
@@ -60,11 +60,11 @@ class Execution:
     """A scenario with a planned tilt.
 
     Attributes:
-        scenario: With the plan's timing, and tolerances for fast tilts.
-        planning: How it was planned.
+        scenario: Scenario with the plan's timing, and tolerances for fast tilts.
+        planning: Options of the planning.
         plan: The plan.
-        joint_path: How the arms follow it.
-        grip: The plan's normal forces, which are the least that the hands press with.
+        joint_path: Joint angles along the manoeuvre.
+        grip: Normal forces of the plan, as least normal forces of the hands.
     """
 
     scenario: Scenario
@@ -77,14 +77,14 @@ class Execution:
 def planned_tilt(
     scenario: Scenario, planning: Planning, robot: RobotModel | None = None
 ) -> Execution:
-    """Plans the tilt of a scenario, and puts the plan into its manoeuvre.
+    """Plan the tilt of a scenario, and return the scenario with the plan in its manoeuvre.
 
     Raises:
-        InvalidInputError: Not one phase does the whole tilt.
+        InvalidInputError: No single phase does the whole tilt.
         PathError: The arms cannot follow the path.
         PlanError: No timing keeps all limits.
     """
-    # Whatever timing the scenario has, planned ones included, the plan is the same.
+    # The plan must not depend on the scenario's timing, which may be a planned one.
     slow = replace(scenario, phases=stretched(scenario.phases, _SLOW_S))
     planned = made_plan(slow, own_margins(scenario.control), planning, robot)
     found = planned.solution
@@ -100,8 +100,8 @@ def planned_tilt(
             error_deg=1.0,
             slip_mm=1.0,
             spin_deg=0.2,  # numerical: at most 0.13, and a quarter of that at half the step
-            utilisation=1.01,  # slip counts; what is over 1 is rounding
-            force_error=0.1,  # 5 % without deviations, as forces jump with the acceleration
+            utilisation=1.01,  # slip is judged instead; values above 1 are rounding
+            force_error=0.1,  # 5 % without deviations, since forces jump with the acceleration
             support_force_error=0.1,
             saturated_s=0.02,
         ),
@@ -113,7 +113,7 @@ def planned_tilt(
 def made_plan(
     scenario: Scenario, margins: Margins, planning: Planning, robot: RobotModel | None = None
 ) -> Plan:
-    """The plan of a scenario's tilt, as it is asked for.
+    """Return the plan of a scenario's tilt for given options.
 
     Raises:
         PathError: The arms cannot follow the path.
@@ -134,10 +134,10 @@ def made_plan(
 
 
 def timed(phases: tuple[Phase, ...], timing: Timing) -> tuple[Phase, ...]:
-    """The phases, with this timing of the one that tilts.
+    """Return the phases, with a timing for the one that tilts.
 
     Raises:
-        InvalidInputError: There is not one phase that does the whole tilt.
+        InvalidInputError: No single phase does the whole tilt.
     """
     index = _whole_tilt(phases)
     phase = replace(phases[index], duration_s=timing.duration, timing=timing)
@@ -153,7 +153,7 @@ def _whole_tilt(phases: tuple[Phase, ...]) -> int:
 
 
 def _grip(planned: Plan) -> GripSchedule:
-    """At each grid point the larger normal forces of the two intervals that meet there."""
+    """Return the larger normal forces of the two adjacent intervals at each grid point."""
     found, hands = planned.solution, len(planned.scenario.hands)
     f_n = found.w_OC_C[0][:, :hands, N]
     first, last = f_n[:1], f_n[-1:]

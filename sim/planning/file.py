@@ -1,4 +1,4 @@
-"""A plan as plain data, for its file: timing, forces, torques, and what limits them where."""
+"""A plan as plain data for its file: timing, forces, torques, and the active limits."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from fulcrum.sim.planning.plan import Plan
 
 
 def plan_content(plan: Plan) -> dict[str, Any]:
-    """Everything about a plan, for JSON; rows of stations are the two ends of every interval."""
+    """Return all data of a plan for JSON; rows of stations are the two ends of every interval."""
     found, problem = plan.solution, plan.solution.problem
     point = problem.stations[:, 0]
     a, b = found.motion

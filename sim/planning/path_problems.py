@@ -15,12 +15,12 @@ from fulcrum.synthesis.problem import Gravity
 
 
 class PathProblems:
-    """Object on its path, arms in the posture that inverse kinematics plans for it.
+    """Problems along the path: the object on it, the arms in the planned postures.
 
     Attributes:
         scenario: The scene.
         end_deg: Tilt at the end of the path [deg].
-        joint_path: How the arms follow it; None without joints.
+        joint_path: Joint angles along the path; None without joints.
     """
 
     def __init__(
@@ -32,15 +32,15 @@ class PathProblems:
         grip: GripSchedule | None = None,
         robot: RobotModel | None = None,
     ) -> None:
-        """Plans the joint path, if need be.
+        """Plan the joint path if it is not given.
 
         Args:
             scenario: The scene.
-            control: What the synthesis is told: friction factor, preload, objective.
+            control: Settings of the synthesis: friction factor, preload, objective.
             with_joints: Whether the arms are part of the problem: (15) and (16).
-            joint_path: The scenario's, where it is planned already.
-            grip: The least normal forces of the hands; the control's preload if left out.
-            robot: The scenario's, where it is built already.
+            joint_path: Joint path of the scenario; planned if left out.
+            grip: Least normal forces of the hands; the control's preload if left out.
+            robot: Model of the scenario's robots; built if left out.
 
         Raises:
             PathError: The arms cannot follow the path.
@@ -53,11 +53,11 @@ class PathProblems:
         self._statics = Statics(scenario, control, grip)
 
     def tilts(self, step_deg: float) -> Array:
-        """Evenly spaced tilts from start to end, at most a step apart [deg]."""
+        """Return evenly spaced tilts from start to end [deg], at most a step apart."""
         return np.linspace(0.0, self.end_deg, int(np.ceil(self.end_deg / step_deg - 1e-9)) + 1)
 
     def problem(self, tilt_deg: float) -> Problem:
-        """The problem at a tilt [deg].
+        """Return the problem at a tilt [deg].
 
         Raises:
             InvalidInputError: The tilt is not on the path.
@@ -71,11 +71,11 @@ class PathProblems:
         return self._statics.problem(state, p_WO, quat_WO, tilt)
 
     def gravity(self, tilt_deg: float) -> Gravity:
-        """The object's weight at a tilt [deg]."""
+        """Return the object's weight at a tilt [deg]."""
         return gravity(self.scenario.object, self.orientation(tilt_deg))
 
     def orientation(self, tilt_deg: float) -> Array:
-        """Orientation of the object at a tilt [deg], R_WO, (3, 3)."""
+        """Return the orientation R_WO of the object, (3, 3), at a tilt [deg]."""
         return self._path.pose(self._tilt(tilt_deg))[0]
 
     def _tilt(self, tilt_deg: float) -> float:

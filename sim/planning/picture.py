@@ -1,4 +1,4 @@
-"""A plan as a picture: tilt, forces, friction, torques and speeds over time."""
+"""Picture of a plan: tilt, forces, friction, torques and speeds over time."""
 
 from __future__ import annotations
 
@@ -14,12 +14,12 @@ mpl.use("Agg")
 from matplotlib import pyplot as plt
 from matplotlib.axes import Axes
 
-# As many joints as a legend can name: those that come nearest to their limits.
+# Number of joints that fit in a legend; those nearest to their limits are drawn.
 _NAMED = 6
 
 
 def draw(plan: Plan, file: Path) -> None:
-    """Writes the picture as PNG."""
+    """Write the picture of a plan to a PNG file."""
     found = plan.solution
     t = plan.times[found.problem.stations[:, 0]]
     canvas, axes = plt.subplots(5, 1, figsize=(9, 13), sharex=True, layout="constrained")

@@ -1,4 +1,4 @@
-"""A planned tilt: timing of a scenario's path and its forces, and the page that shows them."""
+"""A planned tilt: timing and forces along a scenario's path, and their page."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ _LISTED = 0.5
 
 
 class PlanError(FulcrumError):
-    """No timing of the tilt keeps all limits; names those that limit it most, and at which tilt."""
+    """No timing of the tilt keeps all limits; names the tightest limits and their tilt."""
 
     def __init__(self, scenario: str, what: str, binding: list[tuple[str, float]]) -> None:
         self.binding = binding
@@ -50,7 +50,7 @@ class Moment(NamedTuple):
     """A plan at one instant.
 
     Attributes:
-        tilt, rate, acceleration: [rad, rad/s, rad/s^2].
+        tilt, rate, acceleration: Tilt and its derivatives [rad, rad/s, rad/s^2].
         q, qd, qdd: Joint angles, speeds and accelerations [rad or m, per s, per s^2], (l,).
         w_OC_C: Wrenches on the object in contact axes [N, N·m], (m, 6).
         tau: Joint torques [N·m or N], (l,).
@@ -70,7 +70,7 @@ class Along(NamedTuple):
     """A plan at many tilts.
 
     Attributes:
-        rate: [rad/s], (k,).
+        rate: Rate of the tilt [rad/s], (k,).
         w_OC_C: Wrenches on the object in contact axes [N, N·m], (k, m, 6).
         tau: Joint torques [N·m or N], (k, l).
     """
@@ -89,8 +89,8 @@ class Plan:
         margins: Distances kept to the limits.
         joints: Names of the joints.
         solution: Timing and forces; its path coordinate is the share of the tilt.
-        q: Joint angles over that share.
-        share: Share of the given uncertainty that the plan holds for [-]; 1 is all of it.
+        q: Joint angles [rad or m] over that share.
+        share: Share of the required uncertainty that the plan holds for [-]; 1 is all of it.
     """
 
     scenario: Scenario
@@ -121,11 +121,10 @@ class Plan:
         return math.sqrt(self.solution.b.max()) * math.radians(self.scenario.path.angle_deg)
 
     def at(self, t: float) -> Moment:
-        """Return the plan at a time [s]: at rest before its start and after its end.
+        """Return the plan at a time [s]; it is at rest before its start and after its end.
 
-        The timing is exact; forces and torques are linear in the tilt between grid points, where
-        they jump. With a force rate they and the acceleration are linear in time between the
-        middles of intervals, and continuous.
+        The timing is exact. Forces and torques are linear in the tilt between grid points, where
+        they jump.
         """
         found = self.solution
         s = found.problem.s
@@ -159,10 +158,10 @@ class Plan:
         return w, tau[first] + part[:, None] * (tau[second] - tau[first])
 
     def along(self, tilts: Array) -> Along:
-        """Return the plan over the tilt instead of time, with forces and torques as in :meth:`at`.
+        """Return the plan at tilts, with forces and torques as in :meth:`at`.
 
         Args:
-            tilts: [rad], (k,); beyond its ends the plan's at those.
+            tilts: Tilts [rad], (k,), clipped to those of the plan.
         """
         found, s = self.solution, self.solution.problem.s
         share = np.clip(tilts / math.radians(self.scenario.path.angle_deg), s[0], s[-1])
@@ -174,16 +173,16 @@ class Plan:
         return Along(rate * math.radians(self.scenario.path.angle_deg), w, tau)
 
     def stretched(self, factor: float) -> Plan:
-        """Return the same motion in ``factor`` times the duration, with forces of its own.
+        """Return the same motion in ``factor`` times the duration, with newly computed forces.
 
-        They are best for the plan's objective; of a plan in least time they have the largest
-        friction margin.
+        The forces are optimal for the plan's objective; for a plan in least time they have the
+        largest friction margin.
 
         Args:
-            factor: > 0; below 1 the motion is faster.
+            factor: Factor on the duration, > 0; below 1 the motion is faster.
 
         Raises:
-            PlanError: There are none, as where statics has none and only speed helps; says where.
+            PlanError: No forces exist, e.g. where only a faster motion has forces; names the tilt.
         """
         positive("stretch", factor)
         what = f"a tilt in {self.duration * factor:.3g} s"
@@ -197,7 +196,7 @@ class Plan:
         return replace(self, solution=_solve(self.scenario, problem, what))
 
     def _check_speeds(self, factor: float, what: str) -> None:
-        """Refuse a motion that breaks limits of speed or acceleration, which no forces change."""
+        """Refuse a motion beyond limits of speed or acceleration, which no forces change."""
         places = self.tilt[self.solution.problem.stations[:, 0]]
         broken: dict[str, tuple[float, float]] = {}
         for kind, power in (("speed", 1), ("acceleration", 2)):
@@ -211,12 +210,12 @@ class Plan:
             raise PlanError(self.scenario.name, what, [(worst, broken[worst][1])])
 
     def stretches(self) -> list[tuple[float, float, tuple[str, ...]]]:
-        """Return the parts of the path with the same limits reached: from, to [deg], which."""
+        """Return the parts of the path with the same limits reached: from, to [deg], and limits."""
         used = self.solution.active()
         tilts = np.degrees(self.tilt)
         merged: list[tuple[float, float, tuple[str, ...]]] = []
         for k in range(len(tilts) - 1):
-            # A limit that either end of an interval uses up is active in it.
+            # A limit that is reached at either end of an interval is active in it.
             limits = tuple(dict.fromkeys((*used[2 * k], *used[2 * k + 1])))
             low, high = float(tilts[k]), float(tilts[k + 1])
             if merged and set(merged[-1][2]) == set(limits):
@@ -276,16 +275,16 @@ def plan(
     """Plan the tilt of a scenario.
 
     Args:
-        scenario: The scene; the timing and the forces of its own phases do not count.
-        margins: What to keep clear of.
-        objective: What is minimised.
-        duration: The longest that the tilt may take [s].
-        points: Grid points, at least 3.
-        uncertainty: What the plan is to serve with one timing and one grip.
-        robot: The scenario's, where it is built already.
+        scenario: The scene; timing and grip of its phases are not used.
+        margins: Margins to all limits.
+        objective: Objective that is minimised.
+        duration: Longest duration of the tilt [s].
+        points: Number of grid points, at least 3.
+        uncertainty: Deviations for all of which the plan holds, with one timing and one grip.
+        robot: Model of the scenario's robots; built if left out.
 
-    Raises:
-        InvalidInputError: An argument is senseless.
+        Raises:
+            InvalidInputError: An argument is invalid.
         PathError: The arms cannot follow the path.
         PlanError: No timing keeps all limits.
     """

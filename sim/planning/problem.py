@@ -1,4 +1,4 @@
-"""The path problem of a scenario's tilt: contacts, inertia of object and robot, and all limits."""
+"""The path problem of a scenario's tilt: contacts, inertia of object and robots, all limits."""
 
 from __future__ import annotations
 
@@ -22,8 +22,8 @@ from fulcrum.synthesis.checks import not_negative, positive
 from fulcrum.synthesis.path import Accelerations, InertialTorques, Load, PathProblem, Rates
 from fulcrum.synthesis.robust import UncertaintySet
 
-# Degree of the spline through the joint angles, and their pose error [m and rad]: a cubic one and
-# a tenth of the accuracy suffice to follow angles, but not for their second derivative.
+# Degree of the spline through the joint angles, and their pose error [m and rad]. A cubic spline
+# and a tenth of the accuracy would suffice for the angles, but not for their second derivative.
 _DEGREE, _SOLVED = 7, 1e-10
 
 CERTAIN = UncertaintySet()
@@ -31,14 +31,15 @@ CERTAIN = UncertaintySet()
 
 @dataclass(frozen=True)
 class Margins:
-    """What a plan keeps clear of.
+    """Margins of a plan to its limits.
 
     Attributes:
         friction_factor: Share of the friction that may be used [-].
         limits: Share of the robot's torque and speed limits that may be used [-].
-        grip_min, grip_max: Bounds of the hands' normal forces [N]; their own bounds count, too.
+        grip_min, grip_max: Bounds of the hands' normal forces [N], besides those of the contacts.
         tip_speed: Largest speed of the hands' contacts [m/s].
-        tip_acceleration: Their largest acceleration [m/s^2]: at the end, how softly it is set down.
+        tip_acceleration: Largest acceleration of the hands' contacts [m/s^2]; smaller values set
+            the object down more softly.
     """
 
     friction_factor: float = 0.8
@@ -63,7 +64,7 @@ class Margins:
 
 
 def own_margins(control: Control) -> Margins:
-    """Margins with the friction factor and preload of a control."""
+    """Return margins with the friction factor and preload of a control."""
     return Margins(friction_factor=control.friction_factor, grip_min=control.preload)
 
 
@@ -74,16 +75,16 @@ def path_problem(
     uncertainty: UncertaintySet = CERTAIN,
     robot: RobotModel | None = None,
 ) -> tuple[PathProblem, BSpline, tuple[str, ...]]:
-    """The path problem of a scenario's tilt, the joint angles over its share, and the joints.
+    """Return the path problem of a tilt, the joint angles over its share, and the joints' names.
 
     Args:
         scenario: The scene, whose path the arms follow.
-        margins: What to keep clear of.
-        points: Grid points.
-        uncertainty: By how much the world may differ from the scenario with its true friction:
-            one timing and one grip serve all of the set, and the scenario itself with the margins'
-            friction factor, which is the first load.
-        robot: The scenario's, where it is built already.
+        margins: Margins to all limits.
+        points: Number of grid points.
+        uncertainty: Deviations of the world from the scenario with its true friction. One timing
+            and one grip serve the whole set, and the scenario itself with the margins' friction
+            factor, which is the first load.
+        robot: Model of the scenario's robots; built if left out.
 
     Raises:
         PathError: The arms cannot follow the path.
@@ -132,7 +133,7 @@ def path_problem(
 
 
 def _corners(thing: Object, uncertainty: UncertaintySet) -> list[Object]:
-    """The object with every extreme of mass and centre of mass."""
+    """Return the object with every combination of extreme mass and centre of mass."""
     shares = {1.0 - uncertainty.mass, 1.0 + uncertainty.mass}
     places = [
         {place - offset, place + offset}
@@ -145,23 +146,23 @@ def _corners(thing: Object, uncertainty: UncertaintySet) -> list[Object]:
 
 
 def _inertia(scenario: Scenario, thing: Object, path: ObjectPath, s: Array) -> tuple[Array, Array]:
-    """Wrenches that accelerate an object, by the share's acceleration and squared rate, (K, 6)."""
+    """Return the inertial wrenches of an object per acceleration and squared rate of s, (K, 6)."""
     world = replace(scenario, object=thing)
     wrenches = np.array([inertial_wrenches(world, path, path.end * x) for x in s])
     return path.end * wrenches[:, 0], path.end**2 * wrenches[:, 1]
 
 
 def _gripped(scenario: Scenario, grip_max: float) -> Scenario:
-    """The scenario with hands that press no harder than that [N]."""
+    """Return the scenario with the hands' normal forces bounded by `grip_max` [N]."""
     hands = (replace(hand, f_n_max=min(hand.f_n_max, grip_max)) for hand in scenario.hands)
     return replace(scenario, hands=tuple(hands))
 
 
 def tilting_curve(path: JointPath) -> BSpline:
-    """Joint angles over the share of the tilt, through all phases that turn the object.
+    """Return the joint angles over the share of the tilt, through all phases that tilt the object.
 
     Raises:
-        InvalidInputError: No phase turns it, or one turns it back.
+        InvalidInputError: No phase tilts it, or one tilts it back.
     """
     shares: list[Array] = []
     angles: list[Array] = []
@@ -179,7 +180,7 @@ def tilting_curve(path: JointPath) -> BSpline:
 
 
 def _within(problem: Problem, share: float) -> Problem:
-    """The problem with a share of the torque limits."""
+    """Return the problem with the torque limits multiplied by `share`."""
     joints = problem.joints
     assert joints is not None
     limited = replace(joints, tau_min=share * joints.tau_min, tau_max=share * joints.tau_max)
@@ -189,7 +190,7 @@ def _within(problem: Problem, share: float) -> Problem:
 def _tips(
     scenario: Scenario, margins: Margins, path: ObjectPath, s: Array
 ) -> tuple[Rates, Accelerations]:
-    """Speeds and accelerations of the hands' contacts, which go with the object."""
+    """Return limits on speeds and accelerations of the hands' contacts on the object."""
     places = [np.asarray(hand.p_OC_O) for hand in scenario.hands]
     derivatives = np.array([[path.derivatives(path.end * x, p) for p in places] for x in s])
     slopes, curvatures = path.end * derivatives[:, :, 0], path.end**2 * derivatives[:, :, 1]

@@ -1,8 +1,8 @@
-"""Plans the grip of the robust controller: one grip that serves every world of a set.
+"""Planning of the robust controller's grip: one grip that serves every world of a set.
 
 At each tilt of a grid one robust counterpart of (17) is solved with the true friction. Where no
-grip serves the whole set on top of the whole preload, the largest share of both that one serves
-counts.
+grip serves the whole set and the whole preload, the grip serves the largest possible share of
+both.
 """
 
 from __future__ import annotations
@@ -22,14 +22,15 @@ from fulcrum.synthesis.arrays import Array
 from fulcrum.synthesis.problem import Gravity
 from fulcrum.synthesis.robust import RobustInfeasibleError, Scaling, largest_scaling, robust_grip
 
-# The grid's coarsest and finest step. Half of the finest is half of what one contact set of
-# :mod:`fulcrum.sim.model.statics` stands for [deg].
+# Coarsest and finest step of the grid of tilts [deg]. The finest is less than the step for which
+# :mod:`fulcrum.sim.model.statics` prepares contacts.
 _STEP_DEG, _FINEST_DEG = 5.0, 0.3
-# How much less than the grip computed half way the interpolated one may be, and how much more [N].
+# Largest deficit and largest excess of the interpolated grip against the computed one half way
+# between two points [N].
 _SHORT, _OVER = 0.05, 0.5
-# Shares are found to within two to the power of minus this.
+# Number of bisections of a share, which is accurate to 2^-n.
 _HALVINGS = 4
-# Tilt [deg], normal forces of the hands [N], (n,), and the share of the robustness that they give.
+# Tilt [deg], normal forces of the hands [N], (n,), share of the robustness that they give [-].
 _Point = tuple[float, Array, float]
 
 
@@ -40,14 +41,14 @@ def plan_grip(
     robot: RobotModel | None = None,
     best_effort: bool = False,
 ) -> GripSchedule | None:
-    """The least grip that gives the control its robustness; None if it asks for none.
+    """Return the least grip for a control's robustness; None for a control without it.
 
     Args:
-        scenario: The scene as it is believed.
-        control: The controller.
-        joint_path: The scenario's, where it is planned already.
-        robot: The scenario's, where it is built already.
-        best_effort: Whether the control's preload alone does where no forces hold the object.
+        scenario: The nominal scene.
+        control: Settings of the controller.
+        joint_path: Joint path of the scenario; planned if left out.
+        robot: Model of the scenario's robots; built if left out.
+        best_effort: Whether to use the control's preload where no forces hold the object.
 
     Raises:
         PathError: The arms cannot follow the path.
@@ -77,10 +78,10 @@ def plan_grip(
 
 
 def _between(at: Callable[[float, float], _Point], before: _Point, after: _Point) -> list[_Point]:
-    """Points to add between two, so that interpolation keeps to what is computed half way.
+    """Return the points to add between two, until interpolation agrees with the grip half way.
 
-    What is computed there is the grip for the smaller share of the two, if there is one: shares are
-    steps of a bisection, and between two of them grip jumps.
+    The grip half way is that for the smaller of the two shares, if there is one: shares are steps
+    of a bisection, and the grip jumps from one share to the next.
     """
     if after[0] - before[0] < 2.0 * _FINEST_DEG:
         return []
@@ -96,13 +97,13 @@ def _between(at: Callable[[float, float], _Point], before: _Point, after: _Point
 def borne(
     scenario: Scenario, control: Control, step_deg: float, joint_path: JointPath | None = None
 ) -> dict[float, Scaling]:
-    """How much of the set of a robust control one grip bears, by tilt [deg].
+    """Return by tilt [deg] the largest scaling of a robust control's set that one grip withstands.
 
     Args:
-        scenario: The scene as it is believed.
-        control: The controller.
+        scenario: The nominal scene.
+        control: Settings of the controller, with robustness.
         step_deg: Largest step between tilts [deg].
-        joint_path: The scenario's, where it is planned already.
+        joint_path: Joint path of the scenario; planned if left out.
 
     Raises:
         PathError: The arms cannot follow the path.
@@ -124,17 +125,17 @@ def _true_problems(
     joint_path: JointPath | None,
     robot: RobotModel | None = None,
 ) -> PathProblems:
-    """The problems with the believed friction in full: the set says how much less it may be."""
+    """Return the problems with the full nominal friction; the set contains its reductions."""
     # The norm makes the forces of unequal hands unique.
     full = replace(control, friction_factor=1.0, objective=Objective.NORM_NORMAL_FORCE)
     return PathProblems(scenario, full, joint_path=joint_path, robot=robot)
 
 
 def _serving(problem: Problem, gravity: Gravity, control: Control, share: float) -> Array:
-    """Normal forces of the hands [N], (n,), that give a share of the robustness.
+    """Return normal forces of the hands [N], (n,), that give a share of the robustness.
 
     Raises:
-        RobustInfeasibleError: None do.
+        RobustInfeasibleError: There are none.
         SolverError: The solver gave neither forces nor a proof.
     """
     assert control.robustness is not None
@@ -148,7 +149,7 @@ def _serving(problem: Problem, gravity: Gravity, control: Control, share: float)
 def _grip(
     problem: Problem, gravity: Gravity, control: Control, best_effort: bool
 ) -> tuple[Array, float]:
-    """Normal forces of the hands [N], (n,), and the share of the robustness that they give."""
+    """Return normal forces of the hands [N], (n,), and their share of the robustness [-]."""
 
     def serving(share: float) -> Array:
         return _serving(problem, gravity, control, share)

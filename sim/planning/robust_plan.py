@@ -1,4 +1,4 @@
-"""Plans that serve as much of an uncertainty set as one timing and one grip can."""
+"""Plans for the largest share of an uncertainty set that one timing and one grip serve."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from fulcrum.sim.scenario import Scenario
 from fulcrum.synthesis.path import PathObjective
 from fulcrum.synthesis.robust import UncertaintySet
 
-# Shares are found to within two to the power of minus this, on a grid of so many points.
+# Number of bisections of the share, which is accurate to 2^-n; number of grid points for it.
 _HALVINGS, _POINTS = 4, 41
 
 
@@ -28,21 +28,21 @@ def robust_plan(
     stretch: float = 1.0,
     robot: RobotModel | None = None,
 ) -> Plan:
-    """The plan that serves the largest share of a set, itself and the scenario's own margins.
+    """Return the plan that serves the largest share of a set, and the margins in the scenario.
 
     Args:
-        scenario: The scene; the timing and the forces of its own phases do not count.
-        margins: What to keep clear of where the scenario is as believed.
-        uncertainty: The worlds to serve.
-        objective: What is minimised.
-        duration: The longest that the tilt may take before it is stretched [s].
-        points: Grid points.
-        stretch: By how much the duration is stretched then.
-        robot: The scenario's, where it is built already.
+        scenario: The scene; timing and grip of its phases are not used.
+        margins: Margins to all limits without deviations.
+        uncertainty: Set of deviations to serve.
+        objective: Objective that is minimised.
+        duration: Longest duration of the tilt before it is stretched [s].
+        points: Number of grid points.
+        stretch: Factor on the planned duration [-].
+        robot: Model of the scenario's robots; built if left out.
 
     Raises:
         PathError: The arms cannot follow the path.
-        PlanError: No timing keeps all limits, even if all is as believed.
+        PlanError: No timing keeps all limits, even without deviations.
     """
 
     robot = robot or RobotModel(scenario)
@@ -66,7 +66,7 @@ def robust_plan(
         except PlanError:
             continue
         share += float(step)
-    # A finer grid leaves more room, not less; but for what lies between the coarse one's points.
+    # A finer grid usually allows a larger share, but its additional points may also exclude one.
     for down in np.arange(share, 0.0, -(0.5**_HALVINGS)):
         try:
             return serving(float(down), points)

@@ -1,4 +1,4 @@
-"""What is controlled: the truth about robots, object and contacts, in one engine or another."""
+"""The plant: true robots, object and contacts, simulated by MuJoCo or Drake."""
 
 from fulcrum.sim.plant.engines import Engine, check_installed, make_plant
 from fulcrum.sim.plant.mujoco import MujocoPlant

@@ -1,19 +1,21 @@
-r"""Adds to MuJoCo's contact rows the acceleration that they leave out.
+r"""Correction of MuJoCo's contact rows by the acceleration that they leave out.
 
-The velocity of a contact row is :math:`J v`, so that its acceleration is :math:`J \dot v + \dot J
-v`. MuJoCo's rows ask :math:`J \dot v` to be what stiffness and damping want (``efc_aref``), and
-leave out :math:`c = \dot J v`: at a point p of the object, whose frame is at x and turns with
-:math:`\omega`,
+The velocity of a contact row is :math:`J v`, so its acceleration is :math:`J \dot v + \dot J v`.
+MuJoCo's rows set :math:`J \dot v` to the reference of stiffness and damping (``efc_aref``), and
+leave out :math:`c = \dot J v`. At a point p of the object, whose frame is at x and turns with
+:math:`\omega`, it is
 
 .. math:: c = \omega \times (\omega \times (p - x))
 
-Without it a resting contact takes c for acceleration of its own. Along the normal the impedance d
-makes :math:`-c\, d / ((1 - d) A)` of it (:mod:`sim.model.stiffness`), by which edges let go in fast
-tilts; across, where friction stops what slides within the step, what sticks creeps with :math:`c
-\Delta t`. So c is taken off ``efc_aref`` of all of a contact's rows, the torsional one included.
+Without c a resting contact has an acceleration error. Along the normal it causes the force
+:math:`-c\, d / ((1 - d) A)` with the impedance d (:mod:`sim.model.stiffness`), by which edges let
+go in fast tilts. Across the normal, where friction stops sliding within a step, sticking contacts
+creep at :math:`c \Delta t`. So c is subtracted from ``efc_aref`` of all rows of a contact, the
+torsional one included.
 
-Of a hand c follows from MuJoCo's time derivative of the Jacobian (``mj_jacDot``). The contact's
-axes turn with the object; what that adds goes with the speed of sliding, and is left out.
+For a hand, c follows from MuJoCo's time derivative of the Jacobian (``mj_jacDot``). The contact's
+axes turn with the object; the term from this is proportional to the speed of sliding, and is left
+out.
 """
 
 from __future__ import annotations
@@ -26,7 +28,7 @@ import numpy as np
 from fulcrum.sim.model import hand_body
 from fulcrum.sim.scenario import Scenario
 
-# The cross product with a vector, as a matrix: its entries are linear in the vector's.
+# Tensor that maps a vector to the matrix of its cross product, flattened.
 _CROSS = -np.array(
     [
         [[0.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, -1.0, 0.0]],
@@ -37,31 +39,31 @@ _CROSS = -np.array(
 
 
 class Centripetal:
-    """What the present contacts' rows lack, for the object and the bodies of the hands.
+    """Correction for the present contacts of the object and of the hands' bodies.
 
-    Contacts of other bodies, which are collisions, are left as MuJoCo has them.
+    Contacts of other bodies, which are collisions, are not corrected.
     """
 
     def __init__(self, scenario: Scenario, model: mujoco.MjModel) -> None:
         self._model = model
         self._hands = [int(model.body(hand_body(hand)).id) for hand in scenario.hands]
         self._bodies = [int(model.body(scenario.object.name).id), *self._hands]
-        # Of each geom the row of its body below: what stands still, the object, the hands; else -1.
+        # For each geom the row of its body below: 0 fixed, then object and hands; -1 for others.
         row = np.full(model.nbody, -1)
         row[model.body_weldid == 0] = 0
         row[self._bodies] = np.arange(1, 1 + len(self._bodies))
         self._geom_row = row[model.geom_bodyid]
-        # Of each row: a point, there the acceleration, angular velocity and acceleration.
+        # For each row: a point, its acceleration, and angular velocity and acceleration.
         self._point, self._linear, self._omega, self._angular = np.zeros(
             (4, 1 + len(self._bodies), 3)
         )
         self._jac_linear, self._jac_angular = np.zeros((2, 3, model.nv))
-        # Which contacts there are, and what follows from that: the same for many steps.
+        # Key of the present contacts, and indices that depend on it: unchanged for many steps.
         self._key: tuple[bytes, bytes] | None = None
         self._ours, self._first, self._second, self._rows, self._parts = np.zeros((5, 0), np.intp)
 
     def add(self, data: mujoco.MjData) -> None:
-        """Corrects ``efc_aref`` between ``mj_step1`` and ``mj_step2``."""
+        """Correct ``efc_aref`` between ``mj_step1`` and ``mj_step2``."""
         contact = data.contact
         key = contact.geom.tobytes(), contact.efc_address.tobytes()
         if key != self._key:
@@ -81,12 +83,12 @@ class Centripetal:
         angular = self._angular.take(self._second, axis=0)
         angular -= self._angular.take(self._first, axis=0)
         vectors = np.stack([(B @ point[..., None])[..., 0] + o, angular], axis=-1)
-        # Of each contact along its three axes, then the torsion about the first.
+        # For each contact: components along its three axes, then about them.
         lacking = (axes @ vectors).transpose(0, 2, 1).reshape(-1)
         data.efc_aref[self._rows] -= lacking.take(self._parts)
 
     def _sort(self, contact: Any) -> None:
-        """Finds the contacts of bodies that count, and their rows."""
+        """Find the contacts to correct, and their rows."""
         bodies = self._geom_row[contact.geom]
         self._ours = np.flatnonzero((bodies.min(axis=1) >= 0) & (contact.efc_address >= 0))
         self._first, self._second = bodies[self._ours].T
@@ -96,7 +98,7 @@ class Centripetal:
         self._parts = (6 * np.arange(len(self._ours))[:, None] + count)[present]
 
     def _update(self, data: mujoco.MjData) -> None:
-        """Accelerations at no acceleration of the coordinates: of the object none but turning."""
+        """Update the bodies' accelerations at zero generalised acceleration."""
         self._point[1:] = data.xpos.take(self._bodies, axis=0)
         self._omega[1:] = data.cvel.take(self._bodies, axis=0)[:, :3]
         linear, angular, qvel = self._jac_linear, self._jac_angular, data.qvel

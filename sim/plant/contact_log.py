@@ -1,4 +1,4 @@
-"""The plant's contacts: kept step by step as MuJoCo has them, told apart for many steps at once."""
+"""The contacts of MuJoCo's plant: logged at each step, assigned for many steps at once."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from fulcrum.synthesis.arrays import Array
 
 # A plant contact belongs to the environment contact point within this distance [m].
 _SAME_POINT = 0.01
-# Contacts, and components of constraint forces, that there is room for at first.
+# Initial capacity in contacts, and in components of constraint forces.
 _ROOM = 1024
 _COMPONENTS = np.arange(6)  # of a wrench
 
@@ -21,27 +21,28 @@ class ContactLog:
     """MuJoCo's contacts of consecutive steps, one row per contact.
 
     Attributes:
-        count: How many there are; rows from there on do not count.
-        geoms: The two geoms, (k, 2).
-        point: In the world [m], (k, 3).
-        frame: Contact axes row by row, first the normal from the first geom to the second, (k, 9).
+        count: Number of logged contacts; later rows are unused.
+        geoms: Indices of the two geoms, (k, 2).
+        point: Contact points in the world [m], (k, 3).
+        frame: Contact axes as rows, (k, 9); the first is the normal, from the first geom to the
+            second.
     """
 
     def __init__(self) -> None:
         self.geoms, self.point = np.zeros((_ROOM, 2), np.intp), np.zeros((_ROOM, 3))
         self.frame = np.zeros((_ROOM, 9))
-        # Constraint forces step by step: where among those of its step a contact's own are (-1: it
-        # has none), and how many.
+        # Constraint forces of all steps; for each contact the index of its first one within the
+        # step's (-1 without any), and their number.
         self._forces = np.zeros(_ROOM)
         self._address, self._dim = np.zeros((2, _ROOM), np.intp)
-        # Of each step its time, how many contacts it has, and where its forces begin.
+        # For each step: time, number of contacts, and index of its first constraint force.
         self._t: list[float] = []
         self._counts: list[int] = []
         self._begin: list[int] = []
         self.clear()
 
     def clear(self) -> None:
-        """Forgets all steps."""
+        """Forget all steps."""
         self.count = self._forces_count = 0
         for numbers in (self._t, self._counts, self._begin):
             numbers.clear()
@@ -57,7 +58,7 @@ class ContactLog:
         return np.repeat(self._t, self._counts)
 
     def append(self, data: mujoco.MjData) -> None:
-        """Keeps the contacts of the step that was just made."""
+        """Log the contacts of the step that was just made."""
         contacts, forces = data.contact, data.efc_force
         count, begin = data.ncon, self._forces_count
         first, last, end = self.count, self.count + count, begin + len(forces)
@@ -73,9 +74,10 @@ class ContactLog:
         self.count, self._forces_count = last, end
 
     def wrenches(self) -> Array:
-        """On the second geom in the contact's axes, force first [N, N·m], (count, 6).
+        """Return the wrenches on the second geom in contact axes, force first [N, N·m], (count, 6).
 
-        As of mj_contactForce for elliptic cones, whose constraint forces are contact forces.
+        They are those of mj_contactForce for elliptic cones, where constraint forces are contact
+        forces.
         """
         address, dim = (column[: self.count, None] for column in (self._address, self._dim))
         begin = np.repeat(self._begin, self._counts)[:, None]
@@ -89,10 +91,10 @@ class ContactLog:
 
 
 class ContactReader:
-    """Finds the scenario's contacts among MuJoCo's, by their geoms and places.
+    """Assignment of MuJoCo's contacts to those of the scenario, by geoms and places.
 
     Attributes:
-        collisions: Pairs of geoms that touched against the scenario's will, and when first [s].
+        collisions: Time of the first contact [s] of each unwanted pair of geoms.
     """
 
     def __init__(self, scenario: Scenario, model: mujoco.MjModel) -> None:
@@ -101,11 +103,11 @@ class ContactReader:
         self._geoms = [model.geom(g).name for g in range(model.ngeom)]
         self._is_object = np.isin(self._geoms, [g.name for g in scenario.object.geoms])
         self._unwanted = np.zeros((model.ngeom, model.ngeom), bool)
-        # Pairs that are to touch have names.
+        # Only pairs that may touch have names.
         for i in (i for i in range(model.npair) if not model.pair(i).name):
             a, b = int(model.pair_geom1[i]), int(model.pair_geom2[i])
             self._unwanted[a, b] = self._unwanted[b, a] = True
-        # Which hand's contact a pair of geoms is; -1 for none.
+        # Index of the hand by pair of geoms; -1 for none.
         self._hand = np.full((model.ngeom, model.ngeom), -1)
         for i, hand in enumerate(scenario.hands):
             self._set(self._hand, tip_geom(hand), hand.geom, i)
@@ -113,7 +115,7 @@ class ContactReader:
         supports: dict[tuple[str, str], list[int]] = {}
         for i, support in enumerate(scenario.supports):
             supports.setdefault((support.surface, support.geom), []).append(i)
-        # Supports by pair of geoms, and which of these pairs a pair is; -1 for none.
+        # Supports grouped by pair of geoms, and the index of the group by pair; -1 for none.
         self._supports = list(map(np.array, supports.values()))
         self._pair = np.full((model.ngeom, model.ngeom), -1)
         for i, pair in enumerate(supports):
@@ -127,16 +129,16 @@ class ContactReader:
     def read(
         self, log: ContactLog, p_WO: Array, R_WO: Array, positions: Array, wrenches: Array
     ) -> NDArray[np.intp]:
-        """Adds up the plant's contacts of s steps at each of the scenario's m contacts.
+        """Sum the plant's contacts of s steps at each of the scenario's m contacts.
 
         Args:
-            log: The plant's contacts; steps count from 0.
+            log: Logged contacts of the plant; steps count from 0.
             p_WO: Positions of the object [m], (s, 3).
             R_WO: Orientations of the object, (s, 3, 3).
-            positions: Written with the contact points in the world [m], (s, m, 3); where there is
-                no contact it is left as it is.
-            wrenches: Written with forces on the object in world axes [N] and torsional moments
-                about the normal into the object [N·m], (s, m, 4); zero where there is no contact.
+            positions: Output: contact points in the world [m], (s, m, 3); unchanged where there is
+                no contact.
+            wrenches: Output: forces on the object in world axes [N] and torsional moments about the
+                normal into the object [N·m], (s, m, 4); zero where there is no contact.
 
         Returns:
             Number of contacts that the scenario does not want, (s,); see ``collisions``.
@@ -150,7 +152,7 @@ class ContactReader:
         # The wrench is the one on the second geom.
         sign = np.where(self._is_object[geoms[ours, 1]], 1.0, -1.0)
         force = sign[:, None] * np.einsum("ki,kij->kj", wrench[:, :3], axes)
-        # Sums over the contacts at the same place; np.add.at takes ten times as long.
+        # Sums over the contacts at the same place; np.add.at is ten times as slow.
         place = np.ravel_multi_index(where, wrenches.shape[:2])
         for i, component in enumerate((*force.T, wrench[:, 3])):
             sums = np.bincount(place, component, minlength=wrenches[..., i].size)
@@ -162,7 +164,7 @@ class ContactReader:
     def _contact(
         self, step: NDArray, geoms: NDArray, point: Array, p_WO: Array, R_WO: Array
     ) -> NDArray[np.intp]:
-        """Which of the scenario's contacts each of the plant's is; -1 for none."""
+        """Return for each of the plant's contacts the index of the scenario's contact, or -1."""
         contact = self._hand[geoms[:, 0], geoms[:, 1]]
         pair = self._pair[geoms[:, 0], geoms[:, 1]]
         for i, supports in enumerate(self._supports):

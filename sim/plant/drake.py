@@ -1,4 +1,4 @@
-"""The plant in Drake: scene, world and protocol are as with MuJoCo, contacts are solved by SAP."""
+"""The plant in Drake, with contacts solved by SAP; scene and world are those for MuJoCo."""
 
 from __future__ import annotations
 
@@ -41,12 +41,12 @@ class DrakePlant:
         """Build the scene.
 
         Args:
-            scenario: What the plant truly is.
-            world: What its robots truly are; as believed by default.
+            scenario: True object, contacts and environment.
+            world: True deviations of the robots; none by default.
 
-        Raises:
-            InvalidInputError: Scenario or world contradict themselves or each other, or ask for
-                what this plant has not.
+            Raises:
+                InvalidInputError: Scenario and world are inconsistent, or require features that
+                    this plant does not have.
         """
         scene = compose(scenario).compile()
         make_true(scene, scenario, world)
@@ -87,7 +87,7 @@ class DrakePlant:
 
     @property
     def collisions(self) -> dict[tuple[str, str], float]:
-        """Pairs of geoms that touched against the scenario's will, and when first [s]."""
+        """Time of the first contact [s] of each unwanted pair of geoms."""
         return self._log.collisions
 
     def reset(self, q: Array) -> None:
@@ -112,7 +112,7 @@ class DrakePlant:
         qd = self._plant.GetVelocities(self._context)
         at = self._pose
         turn, p_WO = q[at : at + 4], q[at + 4 : at + 7]
-        quat_WO = turn / np.linalg.norm(turn)  # Drake lets its length drift
+        quat_WO = turn / np.linalg.norm(turn)  # its length drifts in Drake
         t = self._steps * self._dt
         return Measurement(t, q[self._q], qd[self._qd], p_WO, quat_WO, self._tau.copy())
 

@@ -1,10 +1,10 @@
-"""What touches in Drake's plant: pads on faces, points of the object on surfaces, links on all.
+"""Contact geometries in Drake's plant: pads on faces, points of the object on surfaces, links.
 
-Drake has no contact with torsional friction. A hand's ball is a pad instead: a ring of points at
-the torsion radius, which carries mu e_n per newton of normal force about the normal, on two hinges
-in the face, so that it carries no other moment; it touches a plane on the object's face. Corners
-and rims of the object are spheres of 0.1 mm around the exact points, and the surfaces that they
-touch are lowered by as much: points on planes, without rounded edges.
+Drake has no contact with torsional friction. So a pad replaces the ball of a hand: a ring of
+points at the torsion radius, which carries a moment of mu e_n per newton about the normal. It is
+on two hinges in the face, so it carries no other moment; it touches a plane on the object's face.
+Corners and rims of the object are spheres of 0.1 mm around the exact points. The surfaces that
+they touch are lowered by the same length, so that points touch planes without rounded edges.
 """
 
 from __future__ import annotations
@@ -29,21 +29,21 @@ from fulcrum.sim.plant.drake_model import Bodies, Mount, pose
 from fulcrum.sim.scenario import SUPPORT, ContactMaterial, Friction, Rest, Scenario, Support
 from fulcrum.synthesis.arrays import Array
 
-# Radius of the spheres that stand for points [m].
+# Radius of the spheres that represent points [m].
 _POINT = 1e-4
-# Points on the rim of a cylinder's end; a multiple of four, so that those on the axes are exact.
+# Points on the rim of a cylinder's end; a multiple of four gives exact points on the axes.
 _RIM = 64
-# Points of a hand's pad. SAP lets a point creep in proportion to its force and to how lightly it
-# moves: on a long lever, more of them creep less (0.11 mm of slip with four at 0.5 m).
+# Points of a hand's pad. In SAP a point creeps in proportion to its force over its effective mass:
+# on a long lever more points creep less (0.11 mm of slip with four at 0.5 m).
 _RING, _WIDE_RING = 4, 8
 _WIDE = 0.05  # [m]
-# How far the plane that a pad touches reaches beyond it [m].
+# Margin by which the plane that a pad touches extends beyond the pad [m].
 _FACE = 0.2
-# Half the width of what stands for an endless plane [m].
+# Half the width of the plate that represents an infinite plane [m].
 _PLANE = 10.0
 # A point belongs to the environment contact within this distance [m].
 _SAME_POINT = 0.01
-# Friction of what should not touch [-].
+# Friction of unwanted contacts [-].
 _UNWANTED = Friction(0.5)
 
 
@@ -51,15 +51,15 @@ Posed: TypeAlias = tuple[geometry.Shape, RigidTransform]
 
 
 class Contacts:
-    """Everything that may touch, registered in a plant that is not yet finalised.
+    """All contact geometries, registered in a plant that is not yet finalised.
 
     Attributes:
-        wanted: Geometries of hands and object that may touch, and the index of the scenario's
-            contact that each stands for; -1 for a place of rest, which is none.
-        names: The scene's geom of each geometry that must not touch.
+        wanted: Index of the scenario's contact for each geometry of hands and object that may
+            touch; -1 for a rest.
+        names: Name of the scene's geom for each geometry that must not touch.
         object_ids: Geometries of the object.
-        tips: Where the hands' tips are.
-        pads: Where the pads are, in the axes of the tips [m].
+        tips: Places of the hands' tips.
+        pads: Positions of the pads in the axes of the tips [m].
     """
 
     def __init__(
@@ -87,7 +87,7 @@ class Contacts:
         self._add_unwanted()
 
     def filters(self) -> list[CollisionFilterDeclaration]:
-        """What may touch what; to be applied in order."""
+        """Return the collision filters, to be applied in order."""
         every = GeometrySet(self._ids)
         filters = [CollisionFilterDeclaration().ExcludeWithin(every)]
         for first, second in self._allowed:
@@ -96,7 +96,7 @@ class Contacts:
         return filters
 
     def _add_pad(self, i: int) -> None:
-        """The ring of points of a hand, and the plane that it touches."""
+        """Add the ring of points of hand i, and the plane that it touches."""
         hand, scene = self._scenario.hands[i], self._scene
         site, tip = scene.site(tip_site(hand)), scene.geom(tip_geom(hand))
         place = self._bodies.place(int(site.bodyid[0]), site.pos, site.quat)
@@ -133,7 +133,7 @@ class Contacts:
         self._allowed.append((ring, [face]))
 
     def _add_supports(self) -> None:
-        """Points of the object, for each pair of a geom of it and a surface that it may touch."""
+        """Add the object's points for each pair of its geoms and surfaces that may touch."""
         scenario = self._scenario
         pairs: dict[tuple[str, str], Support | Rest] = {}
         touched: list[Support | Rest] = [*scenario.supports, *scenario.rests]
@@ -162,7 +162,7 @@ class Contacts:
             self._allowed.append((ids, [below]))
 
     def _add_unwanted(self) -> None:
-        """What must not touch: the scene's pairs without a name."""
+        """Add the geometries that must not touch: those of the scene's pairs without a name."""
         scene, ids = self._scene, dict[int, GeometryId]()
         for pair in (i for i in range(scene.npair) if not scene.pair(i).name):
             both = int(scene.pair_geom1[pair]), int(scene.pair_geom2[pair])
@@ -181,7 +181,7 @@ class Contacts:
         return own
 
     def _compiled(self, geom: Any) -> Posed:
-        """The shape of one of the compiled scene's geoms."""
+        """Return the shape and pose of one of the compiled scene's geoms."""
         if geom.type[0] == mujoco.mjtGeom.mjGEOM_MESH:
             mesh = self._scene.mesh(int(geom.dataid[0]))
             first, count = int(mesh.vertadr[0]), int(mesh.vertnum[0])
@@ -198,7 +198,7 @@ class Contacts:
         friction: Friction,
         material: ContactMaterial,
     ) -> GeometryId:
-        """Register a geometry; of two that touch both are as given, so each yields half."""
+        """Register a geometry; both of a pair have the pair's material, so each yields half."""
         properties = geometry.ProximityProperties()
         geometry.AddContactMaterial(
             dissipation=0.0,
@@ -216,7 +216,7 @@ _UNTURNED = np.array([1.0, 0.0, 0.0, 0.0])
 
 
 def _solid(geom: Geom, less: float = 0.0) -> Posed:
-    """One of the scenario's geoms with all faces further in by some length [m], in its owner."""
+    """Return a geom's shape, with all faces moved inwards by `less` [m], and its pose."""
     X_OG = pose(np.asarray(geom.pose.position), np.asarray(geom.pose.quaternion))
     if geom.file is not None:
         vertices = read_mesh(f"{geom.name}.file", geom.file, geom.size).vertices
@@ -230,12 +230,12 @@ def _solid(geom: Geom, less: float = 0.0) -> Posed:
 
 
 def _slab(half: float, depth: float) -> Posed:
-    """A square plate below the plane z = 0; Drake's half-spaces must not move."""
+    """Return a square plate below the plane z = 0, since Drake's half-spaces cannot move."""
     return geometry.Box(2.0 * half, 2.0 * half, depth), RigidTransform([0.0, 0.0, -depth / 2.0])
 
 
 def _primitive(kind: str, size: list[float]) -> Posed:
-    """A shape of MuJoCo's kinds and sizes."""
+    """Return the shape of a MuJoCo geom from its kind and size."""
     if kind == "plane":
         return _slab(_PLANE, _PLANE / 10.0)
     shapes: dict[str, Callable[..., geometry.Shape]] = {
@@ -249,7 +249,7 @@ def _primitive(kind: str, size: list[float]) -> Posed:
 
 
 def _hull(name: str, vertices: Array) -> Posed:
-    """The convex hull of points [m], (k, 3)."""
+    """Return the convex hull of points [m], (k, 3)."""
     lines = [f"v {x:.17g} {y:.17g} {z:.17g}" for x, y, z in vertices.tolist()]
     lines += [f"f {i} {i + 1} {i + 2}" for i in range(1, len(lines) - 1)]
     file = MemoryFile("\n".join([*lines, ""]), ".obj", name)
@@ -257,15 +257,15 @@ def _hull(name: str, vertices: Array) -> Posed:
 
 
 def _reach(geom: Geom) -> float:
-    """How far from an environment contact what touches still belongs to it [m].
+    """Return the distance [m] within which a point belongs to an environment contact.
 
-    A rim that comes to stand touches along an arc: up to a quarter of it on either side.
+    A rim that comes to stand touches along an arc of up to a quarter of it on either side.
     """
     return 1.4 * geom.size[0] if geom.kind == "cylinder" else _SAME_POINT
 
 
 def _points(geom: Geom) -> Iterator[Posed]:
-    """What of a geom of the object touches surfaces, in the object."""
+    """Yield the shapes with which a geom of the object touches surfaces, in the object frame."""
     if geom.kind == "box":
         places = np.array(list(product((-1.0, 1.0), repeat=3))) * geom.size
     elif geom.kind == "cylinder":
@@ -275,7 +275,7 @@ def _points(geom: Geom) -> Iterator[Posed]:
     elif geom.file is not None:
         vertices = read_mesh(f"{geom.name}.file", geom.file, geom.size).vertices
         places = vertices[ConvexHull(vertices).vertices]
-    else:  # round all over
+    else:  # spheres and other round shapes
         yield _solid(geom, -_POINT)
         return
     X_OG = pose(np.asarray(geom.pose.position), np.asarray(geom.pose.quaternion))

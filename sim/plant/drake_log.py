@@ -1,4 +1,4 @@
-"""What happened in Drake's plant: kept step by step, told apart for many steps at once."""
+"""Motion and contacts of Drake's plant: logged at each step, assigned for many steps at once."""
 
 from __future__ import annotations
 
@@ -15,10 +15,10 @@ from fulcrum.synthesis.arrays import Array, N
 
 
 class DrakeLog:
-    """Motion of hands and object before each step, and the contacts during it.
+    """Log of the motion of hands and object before each step, and of the contacts during it.
 
     Attributes:
-        collisions: Pairs of geoms that touched against the scenario's will, and when first [s].
+        collisions: Time of the first contact [s] of each unwanted pair of geoms.
     """
 
     def __init__(self, scenario: Scenario, plant: MultibodyPlant, contacts: Contacts) -> None:
@@ -39,14 +39,14 @@ class DrakeLog:
         self._forget()
 
     def _forget(self) -> None:
-        # Of each step the tips' pose and twist, and the object's twist.
+        # For each step the tips' poses and twists, and the object's twist.
         self._motion: list[Array] = []
-        # Of each contact the step, the scenario's index, the force on the object and the place.
+        # For each contact the step, the scenario's index, the force on the object and the place.
         self._rows: list[tuple[int, int, Array, Array]] = []
         self._collisions: list[int] = []
 
     def before(self, context: Context) -> None:
-        """Keep the motion of hands and object in the state before a step."""
+        """Log the motion of hands and object in the state before a step."""
         plant, row = self._plant, []
         for tip in self._contacts.tips:
             V_WB = tip.body.EvalSpatialVelocityInWorld(context)
@@ -57,7 +57,7 @@ class DrakeLog:
         self._motion.append(np.concatenate(row))
 
     def after(self, context: Context) -> None:
-        """Keep the contacts of the step that was just made."""
+        """Log the contacts of the step that was just made."""
         results = self._plant.get_contact_results_output_port().Eval(context)
         wanted, ours = self._contacts.wanted, self._contacts.object_ids
         step = len(self._collisions)
@@ -71,7 +71,7 @@ class DrakeLog:
                 unwanted += 1
                 self._collide(first, second, context.get_time() - self._dt)
             elif contact >= 0:
-                # The force is that on the body of the second.
+                # The force is the one on the body of the second geometry.
                 force = info.contact_force() if second in ours else -info.contact_force()
                 self._rows.append((step, contact, force, info.contact_point()))
         self._collisions.append(unwanted)
@@ -81,7 +81,7 @@ class DrakeLog:
         self.collisions.setdefault((names[first], names[second]), t)
 
     def read(self, block: Trace) -> None:
-        """Fill a block's columns from the steps that were kept since the last call."""
+        """Fill a block's columns from the steps logged since the last call."""
         steps, n = len(block), len(self._contacts.tips)
         motion = np.array(self._motion)
         tips = motion[:, : 18 * n].reshape(steps, n, 18)
@@ -102,7 +102,7 @@ class DrakeLog:
         self._forget()
 
     def _sum(self, block: Trace) -> None:
-        """Add up what touches at each of the scenario's contacts, about its centre."""
+        """Sum forces and moments about its centre at each of the scenario's contacts."""
         step, contact = np.array([row[:2] for row in self._rows]).T
         force, point = (np.array([row[i] for row in self._rows]) for i in (2, 3))
         normals = self._frames.in_world(rotations(block.quat_WO))[..., N]
@@ -112,7 +112,7 @@ class DrakeLog:
         size = len(block) * self._count
 
         def total(values: Array) -> Array:
-            """Sums by contact and step, of (k, 3) or (k,)."""
+            """Return the sums of values, (k, 3) or (k,), by contact and step."""
             columns = values.T if values.ndim > 1 else [values]
             sums = [np.bincount(place, column, minlength=size) for column in columns]
             return np.array(sums, float).T.reshape(*block.f_W.shape[:2], -1)

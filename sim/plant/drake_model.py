@@ -1,7 +1,7 @@
 """A compiled scene's robots and object as bodies and joints of Drake's MultibodyPlant.
 
-They are read off MuJoCo's compiled model, as the controller's Pinocchio model is, so that any URDF
-or MJCF serves both engines, and what a world changes in the compiled model holds here, too.
+They are read from MuJoCo's compiled model, as is the controller's Pinocchio model. So any URDF or
+MJCF works with both engines, and a world's changes to the compiled model apply here, too.
 """
 
 from __future__ import annotations
@@ -27,10 +27,10 @@ from pydrake.multibody.tree import (
 from fulcrum.synthesis import InvalidInputError
 from fulcrum.synthesis.arrays import Array
 
-# Dry friction is a brake: damping so large that it sticks, with a limited torque [N·m·s/rad].
+# Dry friction is a damper that is stiff enough to stick, with a limited torque [N·m·s/rad].
 _BRAKE_DAMPING = 1e5
-# A pad's mass [kg] and size [m], which do not matter; the inertia of its hinges [kg·m²], so that
-# SAP does not regularise its contacts by how light it is; and a spring of a few N·mm.
+# Mass [kg] and size [m] of a pad, without influence; inertia of its hinges [kg·m²], large enough
+# that SAP does not regularise its contacts for a light body; gains of a spring of a few N·mm.
 _PAD_SPHERE = (1e-4, 0.01)
 _PAD_INERTIA = 0.05
 _PAD_GAINS = PdControllerGains(p=0.5, d=0.3)
@@ -42,7 +42,7 @@ _JOINTS = {
 
 @dataclass(frozen=True)
 class Mount:
-    """Where something of the scene is: the body that carries it, and its pose there."""
+    """A place in the scene: the body that carries it, and the pose on that body."""
 
     body: RigidBody
     X_BG: RigidTransform
@@ -51,25 +51,25 @@ class Mount:
 class Bodies:
     """All bodies of a compiled scene, added to a MultibodyPlant that is not yet finalised.
 
-    Bodies without a joint of their own become one with what carries them.
+    Bodies without joints are merged with the bodies that carry them.
 
     Attributes:
         joints: Drake's joints by name.
-        motors: One actuator for each joint, which carries its armature, by name.
-        controlled: Whether there are actuators with gains: dry friction, or pads.
+        motors: Actuators by joint name; each has the armature of its joint.
+        controlled: Whether there are actuators with gains, for dry friction or pads.
     """
 
     def __init__(self, plant: MultibodyPlant, scene: mujoco.MjModel) -> None:
         """Add the bodies.
 
         Raises:
-            InvalidInputError: A joint is of a kind, or has a spring, that is not modelled here.
+            InvalidInputError: A joint has a kind or a spring that is not modelled here.
         """
         self._plant, self._scene = plant, scene
         self.joints: dict[str, RevoluteJoint | PrismaticJoint] = {}
         self.motors: dict[str, JointActuator] = {}
         self.controlled = False
-        # Of each of the scene's bodies the one that it moves with, and its pose there.
+        # For each of the scene's bodies the body that it moves with, and its pose there.
         self._carriers = {0: (0, RigidTransform())}
         for body in range(1, scene.nbody):
             self._carriers[body] = self._carrier(body)
@@ -81,12 +81,12 @@ class Bodies:
         plant.mutable_gravity_field().set_gravity_vector(scene.opt.gravity)
 
     def place(self, body: int, position: Array, quaternion: Array) -> Mount:
-        """Where a geom or site is that the scene has at a pose on one of its bodies."""
+        """Return the place of a geom or site from its pose on one of the scene's bodies."""
         carrier, X_LB = self._carriers[body]
         return Mount(self._links[carrier], X_LB @ pose(position, quaternion))
 
     def add_pad(self, name: str, place: Mount) -> RigidBody:
-        """A body on two hinges, about x and y of a place, that is held upright by a weak spring."""
+        """Add a body on two hinges, about x and y of a place, held upright by a weak spring."""
         plant, parent = self._plant, place.body
         frame = plant.AddFrame(FixedOffsetFrame(f"{name}/pad", parent.body_frame(), place.X_BG))
         for axis in np.eye(3)[:2]:
@@ -113,7 +113,7 @@ class Bodies:
         return body, RigidTransform(-scene.jnt_pos[last])
 
     def _inertias(self) -> dict[int, SpatialInertia]:
-        """Of everything that moves as one, about the origin and in the axes of its carrier."""
+        """Return the inertia of each group of bodies that move as one, in its carrier's frame."""
         scene, sums = self._scene, dict[int, SpatialInertia]()
         for body, (carrier, X_LB) in self._carriers.items():
             mass = float(scene.body_mass[body])
@@ -174,6 +174,6 @@ class Bodies:
 
 
 def pose(position: Array, quaternion: Array) -> RigidTransform:
-    """A pose from a position [m], (3,), and a quaternion wxyz, (4,)."""
+    """Return the pose with a position [m], (3,), and a quaternion wxyz, (4,)."""
     unit = np.asarray(quaternion, float) / np.linalg.norm(quaternion)
     return RigidTransform(Quaternion(unit), np.asarray(position, float))

@@ -1,4 +1,4 @@
-"""Which engine simulates the plant, by name."""
+"""Engines that simulate the plant, by name."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from fulcrum.synthesis import InvalidInputError
 
 
 class Engine(StrEnum):
-    """What simulates the plant."""
+    """Engine that simulates the plant."""
 
     MUJOCO = "mujoco"
     DRAKE = "drake"
@@ -22,7 +22,7 @@ def check_installed(engine: Engine) -> None:
     """Refuse an engine whose package is missing.
 
     Raises:
-        InvalidInputError: It is.
+        InvalidInputError: The package is missing.
     """
     if engine is Engine.DRAKE and find_spec("pydrake") is None:
         raise InvalidInputError("engine", "drake, which is not installed", "pip install .[drake]")

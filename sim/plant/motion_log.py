@@ -1,4 +1,4 @@
-"""How hands and object move: kept step by step as MuJoCo has it, worked out for many at once."""
+"""Motion of hands and object in MuJoCo: logged at each step, converted for many at once."""
 
 from __future__ import annotations
 
@@ -11,19 +11,19 @@ from fulcrum.sim.scenario import Scenario
 from fulcrum.sim.signals import Trace
 from fulcrum.synthesis.arrays import Array
 
-# Steps that there is room for at first.
+# Initial capacity in steps.
 _ROOM = 256
 _ANGULAR, _LINEAR = slice(0, 3), slice(3, 6)
 
 
 class MotionLog:
-    """MuJoCo's velocities and poses of hands and object, consecutive steps, one row per step."""
+    """MuJoCo's velocities and poses of hands and object, one row per step."""
 
     def __init__(self, scenario: Scenario, model: mujoco.MjModel, data: mujoco.MjData) -> None:
         tips = [model.site(tip_site(hand)).id for hand in scenario.hands]
         thing = model.body(scenario.object.name).id
         bodies = [*model.site_bodyid[tips], thing]
-        # Velocities belong to the point of each body that is at its tree's centre of mass.
+        # MuJoCo's velocities are those of each body's point at its tree's centre of mass.
         columns = {
             "velocity": [data.cvel[body] for body in bodies],
             "center": [data.subtree_com[root] for root in model.body_rootid[bodies]],
@@ -31,7 +31,7 @@ class MotionLog:
             "tip": [data.site_xpos[tip] for tip in tips],
             "axes": [data.site_xmat[tip] for tip in tips],
         }
-        # Views of what MuJoCo writes, put one after the other into a row.
+        # Views of MuJoCo's arrays, which are concatenated to a row.
         self._views = [view for views in columns.values() for view in views]
         self._rows = np.zeros((_ROOM, sum(map(len, self._views))))
         self._columns: dict[str, slice] = {}
@@ -46,20 +46,20 @@ class MotionLog:
         self._steps = 0
 
     def append(self) -> None:
-        """Keep what belongs to the step that was just made."""
+        """Log the step that was just made."""
         if self._steps == len(self._rows):
             self._rows = np.concatenate([self._rows, np.zeros_like(self._rows)])
         np.concatenate(self._views, out=self._rows[self._steps])
         self._steps += 1
 
     def read(self, block: Trace) -> None:
-        """Write tip poses and world twists (linear first) of the logged steps; forget those.
+        """Write tip poses and world twists (linear first) of the logged steps, and forget those.
 
         Args:
-            block: One row per logged step.
+            block: Rows of the trace, one per logged step.
         """
         block.p_WE[:] = self._read("tip", 3)
-        # Rotations to rounding, for MuJoCo makes them of unit quaternions.
+        # Orthogonal up to rounding, since MuJoCo computes them from unit quaternions.
         axes = self._read("axes", 9).reshape(-1, 3, 3)
         flat = Rotation.from_matrix(axes, assume_valid=True).as_quat(scalar_first=True)
         block.quat_WE[:] = flat.reshape(block.quat_WE.shape)
@@ -68,11 +68,11 @@ class MotionLog:
         self.clear()
 
     def _read(self, name: str, width: int) -> Array:
-        """What was kept of the s steps, (s, k, w)."""
+        """Return a logged quantity of the s steps, (s, k, w)."""
         return self._rows[: self._steps, self._columns[name]].reshape(self._steps, -1, width)
 
     def _twists(self, bodies: slice, points: Array) -> Array:
-        """World twists, (s, b, 6), of bodies' points that are at places in the world, (s, b, 3)."""
+        """Return the world twists, (s, b, 6), of bodies at points in the world, (s, b, 3)."""
         velocity = self._read("velocity", 6)[:, bodies]
         lever = points - self._read("center", 3)[:, bodies]
         turn = velocity[..., _ANGULAR]

@@ -1,4 +1,4 @@
-"""The plant in MuJoCo, behind dm_control's Physics."""
+"""The plant in MuJoCo, through dm_control's Physics."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from fulcrum.sim.signals import AppliedForce, Measurement, Trace
 from fulcrum.sim.world import NO_DEVIATION, World
 from fulcrum.synthesis.arrays import Array
 
-with warnings.catch_warnings():  # dm_control looks for a display on import; none is needed
+with warnings.catch_warnings():  # dm_control warns on import if there is no display
     warnings.simplefilter("ignore")
     from dm_control import mujoco as dm_mujoco
     from dm_control.mujoco import wrapper
@@ -32,13 +32,13 @@ class _Physics(dm_mujoco.Physics):
     centripetal: Centripetal
 
     def step(self, nstep: int = 1) -> None:
-        """Steps the physics; see dm_control."""
+        """Make steps of the plant; see dm_control."""
         with self.check_invalid_state():
             for _ in range(nstep):
                 self.advance()
 
     def advance(self) -> None:
-        """One step, without dm_control's look for warnings, which takes a sixth as long."""
+        """Make one step without dm_control's check for warnings, which adds a sixth of the time."""
         model, data = self.model.ptr, self.data.ptr
         mujoco.mj_step1(model, data)
         self.centripetal.add(data)
@@ -48,11 +48,11 @@ class _Physics(dm_mujoco.Physics):
 class MujocoPlant:
     """A scenario's truth in MuJoCo; implements :class:`sim.plant.protocol.Plant`.
 
-    After :meth:`step` contact forces, tip and object poses belong to the state *before* the step,
-    for which they were computed; :meth:`measure` gives the state after it.
+    After :meth:`step`, contact forces, tip and object poses are those of the state *before* the
+    step; :meth:`measure` returns the state after it.
 
     Attributes:
-        physics: dm_control's Physics.
+        physics: Physics of dm_control.
         joints: Names of the driven joints, in the order of the motors.
     """
 
@@ -60,17 +60,17 @@ class MujocoPlant:
         """Build the scene.
 
         Args:
-            scenario: What the plant truly is.
-            world: What its robots truly are; as believed by default.
+            scenario: True object, contacts and environment.
+            world: True deviations of the robots; none by default.
 
-        Raises:
-            InvalidInputError: Scenario or world contradict themselves or each other.
+            Raises:
+                InvalidInputError: Scenario and world are inconsistent.
         """
         self.physics = _Physics.from_model(wrapper.MjModel(compose(scenario).compile()))
-        self.physics.legacy_step = False  # else new contacts would be read with old forces
+        self.physics.legacy_step = False  # otherwise new contacts are read with old forces
         self._model, self._data = self.physics.model.ptr, self.physics.data.ptr
         data, model = self._data, self._model
-        # Views of what MuJoCo writes, which are slow to ask for one by one.
+        # Views of MuJoCo's arrays, which are slow to access one by one.
         self._warnings, self._ctrl = data.warning.number, data.ctrl
         self._numbers = data.qpos, data.qvel, data.actuator_force
         make_true(model, scenario, world)
@@ -80,7 +80,7 @@ class MujocoPlant:
         self.joints = tuple(model.joint(j).name for j in joints)
         self._q = model.jnt_qposadr[joints].copy()
         free = model.joint(scenario.object.name)
-        # Where angles, speeds, the object's pose and torques are among the numbers, end to end.
+        # Ends of angles, speeds, the object's pose and torques in the concatenated numbers.
         self._measured = np.concatenate(
             [
                 self._q,
@@ -98,7 +98,7 @@ class MujocoPlant:
 
     @property
     def collisions(self) -> dict[tuple[str, str], float]:
-        """Pairs of geoms that touched against the scenario's will, and when first [s]."""
+        """Time of the first contact [s] of each unwanted pair of geoms."""
         return self._reader.collisions
 
     def reset(self, q: Array) -> None:
@@ -110,7 +110,7 @@ class MujocoPlant:
             raise DivergedError(0.0) from error
 
     def place(self, q: Array) -> None:
-        """Set the joint angles q, (l,), of a state that is being reset; forget what was logged."""
+        """Set the joint angles q, (l,), of a state that is being reset; forget the logged steps."""
         self.collisions.clear()
         self._contacts.clear()
         self._motion.clear()
@@ -143,7 +143,7 @@ class MujocoPlant:
 
     def step(self) -> None:
         """See :meth:`Plant.step`."""
-        t = self._data.time  # which MuJoCo sets back where it finds the state beyond all numbers
+        t = self._data.time  # MuJoCo resets it when the state has diverged
         self.physics.advance()
         if np.count_nonzero(self._warnings):
             raise DivergedError(t)

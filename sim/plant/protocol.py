@@ -1,4 +1,4 @@
-"""What a plant is to the loop, whatever engine simulates it."""
+"""Interface between the loop and the plant, independent of the engine."""
 
 from __future__ import annotations
 
@@ -11,17 +11,17 @@ from fulcrum.synthesis.arrays import Array
 
 
 class DivergedError(FulcrumError):
-    """The simulation's state has left what numbers can hold."""
+    """The simulation's state has diverged to non-finite or excessive numbers."""
 
     def __init__(self, t: float) -> None:
         super().__init__(f"the simulation diverged at {t:.3f} s; check the scenario's physics.")
 
 
 class Plant(Protocol):
-    """The truth about robots, object and contacts, one physics step at a time.
+    """The true robots, object and contacts, simulated one physics step at a time.
 
-    Sensors, motors, pushes and their faults are not part of it: they belong to the world
-    (:mod:`sim.world`), which disturbs every engine alike.
+    Sensors, motors, pushes and their faults are not part of it. They belong to the world
+    (:mod:`sim.world`), which applies to every engine in the same way.
 
     Attributes:
         joints: Names of the l driven joints, in the order of the motors.
@@ -31,13 +31,13 @@ class Plant(Protocol):
 
     @property
     def collisions(self) -> dict[tuple[str, str], float]:
-        """Pairs of geoms that touched against the scenario's will, and when first [s]."""
+        """Time of the first contact [s] of each unwanted pair of geoms."""
 
     def reset(self, q: Array) -> None:
         """Put the robots at rest at joint angles q [rad or m], (l,), and the object at its start.
 
         Raises:
-            DivergedError: The state is more than numbers can hold.
+            DivergedError: The state has diverged.
         """
 
     def measure(self) -> Measurement:
@@ -50,14 +50,14 @@ class Plant(Protocol):
         """Make one physics step, and log it.
 
         Raises:
-            DivergedError: The state has left what numbers can hold.
+            DivergedError: The state has diverged.
         """
 
     def contacts(self, block: Trace) -> None:
-        """Fill in what contacts, hands and object did during the logged steps, and forget those.
+        """Write contacts and motion of hands and object of the logged steps, and forget the steps.
 
         Args:
-            block: One row per step since the last call, with p_WO and quat_WO filled in; written
-                are p_WE, quat_WE, twist_WE, twist_WO, p_WC (NaN where nothing touches), f_W and
-                collisions, as of the state before each step and the forces during it.
+            block: Rows of the trace, one per step since the last call, with p_WO and quat_WO filled
+                in. Written are p_WE, quat_WE, twist_WE, twist_WO, p_WC (NaN where nothing touches),
+                f_W and collisions: the state before each step, and the forces during it.
         """

@@ -1,4 +1,4 @@
-"""What a world makes of a compiled scene's robots."""
+"""Application of a world's deviations to a compiled scene's robots."""
 
 from __future__ import annotations
 
@@ -11,11 +11,11 @@ from fulcrum.sim.world import World
 
 
 def make_true(model: mujoco.MjModel, scenario: Scenario, world: World) -> None:
-    """Make a scene's robots what they truly are: hands on wrists, masses, dry friction.
+    """Apply the true hand places, link masses and dry friction to a scene's robots.
 
     Raises:
-        InvalidInputError: A tuple has another length than the robots have driven joints, or a
-            fault names a joint that is none.
+        InvalidInputError: A tuple has another length than the number of driven joints, or a fault
+            names a joint that does not exist.
     """
     joints = [int(model.actuator(i).trnid[0]) for i in range(model.nu)]
     names = [model.joint(joint).name for joint in joints]
