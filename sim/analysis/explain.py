@@ -66,18 +66,21 @@ def explain(problems: PathProblems, tilt_deg: float, synthesizer: Synthesizer) -
         optimum = _optimum(synthesizer.solve(problem), gravity)
     except InfeasibleError as error:
         why_not = conflict(tightest(error.certificate, found), gravity, R_WO)
+    scene = problems.scenario
+    believed = {hand.name: hand.friction.mu for hand in scene.hands}
+    believed |= {support.name: support.friction.mu for support in scene.supports}
     remedies = {}
     for kind, change in found.items():
         blocked = None
         if change.conflict is not None:
             blocked = conflict(change.conflict, gravity, R_WO)
-        text = _words(change, problem, gravity)
+        text = _words(change, problem, gravity, believed)
         remedies[kind] = Remedy(
             change.outcome, change.factor, change.confirmed_within, text, blocked
         )
     return Explanation(
-        scenario=problems.scenario.name,
-        object=problems.scenario.object.name,
+        scenario=scene.name,
+        object=scene.object.name,
         objective=problem.objective,
         tilt_deg=float(tilt_deg),
         weight=gravity.weight,
@@ -164,8 +167,8 @@ def _active(solution: Solution) -> tuple[str, ...]:
     return tuple(active)
 
 
-def _words(change: Change, problem: Problem, gravity: Gravity) -> str:
-    """Return a change in a few words, with the resulting numbers."""
+def _words(change: Change, problem: Problem, gravity: Gravity, friction: dict[str, float]) -> str:
+    """Return a change in a few words, with the resulting numbers: friction as the file says it."""
     kind, factor = change.kind, change.factor
     if change.outcome is ChangeOutcome.ABSENT:
         return f"there are no {kind}"
@@ -188,7 +191,7 @@ def _words(change: Change, problem: Problem, gravity: Gravity) -> str:
     if kind is Kind.WEIGHT:
         text += f" ({factor * gravity.weight:.4g} N)"
     elif kind is Kind.FRICTION:
-        text += _numbers({c.name: factor * c.mu for c in problem.contacts}, "")
+        text += _numbers({c.name: factor * friction[c.name] for c in problem.contacts}, "")
     elif kind is Kind.GRIP:
         text += _numbers({c.name: factor * c.f_n_max for c in problem.contacts}, " N")
     return text if math.isfinite(change.confirmed_within) else f"{text} (not confirmed)"

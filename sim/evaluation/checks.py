@@ -135,7 +135,7 @@ class Checks:
                 f"Contact {name} followed its commanded normal force only to "
                 f"{contact.force_error_rms_n:.3g} N RMS (allowed {allowed:.3g} N)."
             )
-            failures.append(_failure(trace, held_rows, Category.FORCE, name, text))
+            failures.append(_failure(trace, _last(held_rows), Category.FORCE, name, text))
         return failures
 
     def _place(
@@ -163,7 +163,7 @@ class Checks:
             f"Contacts {names} together followed their commanded force only to {off:.3g} N RMS "
             f"(allowed {allowed:.3g} N)."
         )
-        return [_failure(trace, held, Category.FORCE, names, text)]
+        return [_failure(trace, _last(held), Category.FORCE, names, text)]
 
     def _together(
         self, hands: tuple[int, ...], trace: Trace, history: ContactHistory, held: Mask
@@ -258,6 +258,11 @@ class Checks:
             return np.zeros(len(flags), bool)
         length = stretches(flags) + stretches(flags[::-1])[::-1] - 1
         return flags & (length > round(allowed_s / self._scenario.physics.timestep))
+
+
+def _last(mask: Mask) -> Mask:
+    """Return the last row of a mask alone: what is averaged over all rows is known only then."""
+    return mask & (np.arange(len(mask)) == np.flatnonzero(mask)[-1])
 
 
 def _given(value: float | None, default: float) -> float:

@@ -100,8 +100,8 @@ class Control(Settings):
     hands that sink into soft contacts."""
 
     robustness: Robustness | None = None
-    """What the grip must withstand beyond the margins friction_factor and preload_n; controller
-    robust has its own."""
+    """What the grip must withstand beyond the margins friction_factor and preload_n; if it is left
+    out, controller robust has values of its own (docs, "Robustness and sweeps")."""
 
     inertia: bool = False
     """Whether forces and torques include the inertia of object and robot on the timed path;
@@ -134,7 +134,7 @@ def controllers(control: Control) -> dict[str, Control]:
     return {
         "robust": replace(
             control,
-            robustness=_ROBUSTNESS,
+            robustness=control.robustness or _ROBUSTNESS,
             bandwidth=5.0 * control.bandwidth,
             pose_filter_s=0.05,
         ),

@@ -200,7 +200,7 @@ def test_changes_that_would_let_baxter_lift_the_box():
     for kind in (Kind.FRICTION, Kind.TORQUE):
         assert found[kind].factor * weight.factor == pytest.approx(1.0, rel=1e-4)
     assert weight.text == "to at most 0.5985 times (11.97 N)"
-    assert found[Kind.FRICTION].text == "to at least 1.671 times (0.1337 at left and right)"
+    assert found[Kind.FRICTION].text == "to at least 1.671 times (0.1671 at left and right)"
     assert found[Kind.GRIP].text == "there are no grip limits"
     assert all(r.confirmed_within <= 1e-5 for r in found.values())
 
