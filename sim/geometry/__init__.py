@@ -1,4 +1,4 @@
-"""What an object is made of: poses, geoms, shapes, meshes, mass and inertia."""
+"""Geometry of objects: poses, geoms, shapes, meshes, mass and inertia."""
 
 from fulcrum.sim.geometry.geom import Geom
 from fulcrum.sim.geometry.mesh import read_mesh

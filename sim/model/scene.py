@@ -32,7 +32,7 @@ _GEOM_TYPES = {
 
 
 class ObjectMotion(StrEnum):
-    """How the object moves: freely by physics, or posed by the caller (inverse kinematics)."""
+    """Motion of the object: free by physics, or posed by the caller (inverse kinematics)."""
 
     FREE = "free"
     POSED = "posed"

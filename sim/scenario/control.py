@@ -14,7 +14,7 @@ from fulcrum.synthesis.settings import Inline, Key, NotNegative, OrInfinite, Set
 
 @dataclass(frozen=True)
 class Robustness(Settings):
-    """What the grip must withstand."""
+    """Requirements on the grip: deviations to withstand, preload and reaction."""
 
     uncertainty: Annotated[UncertaintySet, Inline] = UncertaintySet()
     """Deviations from the scenario with its true friction, all of which the grip withstands."""
@@ -77,8 +77,8 @@ class Control(Settings):
     """Settings of controller margin; the other controllers are derived from it."""
 
     friction_factor: Annotated[float, Gt(0), Le(1.0)] = 0.8
-    """Share of the believed friction that the synthesis may use [-]. At 1 the optimum lies on the
-    friction cone, where contacts slip."""
+    """Share of the scenario's friction that the synthesis may use [-]. At 1 the optimum lies on
+    the friction cone, where contacts slip."""
 
     preload: Annotated[NotNegative, Key("preload_n")] = 5.0
     """Least normal force of the hands [N]."""

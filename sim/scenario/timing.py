@@ -13,7 +13,7 @@ from fulcrum.synthesis.arrays import Array
 
 @dataclass(frozen=True)
 class Timing:
-    r"""How a phase's progress :math:`p` goes from 0 to 1: :math:`\dot p^2` is linear in it.
+    r"""Motion of a phase's progress :math:`p` from 0 to 1, with :math:`\dot p^2` linear in p.
 
     It is linear between grid points, as in :mod:`synthesis.path.problem`. The rate jumps where the
     grid has the same progress twice.

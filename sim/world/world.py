@@ -55,7 +55,7 @@ class World:
         size: Factor on the object's size about its pivot [-]; its edges and faces move with it.
         friction: Factors on the friction of each contact, hands first [-], (m,).
         hand_place: Shift along (t, o) of each hand's tip from its nominal place on the wrist [m],
-            (n, 2). The hand touches the object as far from the nominal contact.
+            (n, 2). The contact on the object is shifted by the same distance.
         link_mass: Factors on mass and inertia of the link behind each driven joint [-], (l,).
         joint_friction: Dry friction of each driven joint [N·m or N], (l,).
         torque_gain: Factor on each commanded torque [-], (l,).
