@@ -25,6 +25,7 @@ class Category(StrEnum):
     ERROR = "error"
     TILT = "tilt"
     PLACE = "place"
+    DROPPED = "dropped"
     INTERRUPTED = "interrupted"
 
 

@@ -71,9 +71,12 @@ class Judge:
             failures = (Failure(t, Category.INTERRUPTED, "", text),)
         else:
             failures = self._checks.failures(info, trace, history, tilt, contacts)
-            verdict = Verdict.FAIL if failures else Verdict.PASS
             diverged = info.error is not None
             outcome = Outcome.DIVERGED if diverged else measured_outcome(self._scenario, trace)
+            if outcome is Outcome.DROPPED:
+                text = "The object fell, toppled, slid away or was let go."
+                failures += (Failure(float(trace.t[-1]), Category.DROPPED, "", text),)
+            verdict = Verdict.FAIL if failures else Verdict.PASS
         sim_s = len(trace) * self._scenario.physics.timestep
         return Report(
             scenario=self._scenario.name,

@@ -237,7 +237,7 @@ def test_a_robot_whose_package_reaches_out_of_the_folder_is_refused(folder):
     (folder.parent / "package.xml").write_text("<package><name>mine</name></package>")
     (folder / "arm.urdf").write_text("<robot/>")
     own = ('model = "baxter"', 'model = "arm.urdf"')
-    with pytest.raises(FileError, match="given with --allow-path"):
+    with pytest.raises(FileError, match="allowed with --allow-path"):
         said(folder, own)
     assert read(folder / "said.toml", (folder.parent,)).robots[0].model.endswith("arm.urdf")
     (folder / "package.xml").write_text("<package><name>arm</name></package>")

@@ -1,7 +1,6 @@
 """The box of Table II: the bars of the issue, in its own numbers."""
 
 import math
-import re
 
 import numpy as np
 import pytest
@@ -76,17 +75,14 @@ def test_without_preload_the_hands_let_go_where_the_box_balances():
 
 
 def test_three_and_a_half_seconds_are_too_fast_for_quasi_static_forces():
-    # The forces know no inertia: as the tilt speeds up, the box is lifted off its edge. The arms
-    # still carry it to the end, so that only the contact monitor tells (in 3 s the tilt is off by
-    # 0.21 deg, too). In 5 s the edge stays, in 6 s all requirements are met.
+    # The forces know no inertia: as the tilt slows down, the hands have to hold the box back, which
+    # takes all their friction. The arms still carry it to the end, and the edge stays on the table.
+    # (Before the plant had the centripetal term the edge seemed to lift.)
     report, trace, history = run(BOX, "hasty")
     assert report.verdict is Verdict.FAIL
-    lost = np.flatnonzero(settled(BOX, trace) & ~history.kept.all(axis=1))
-    names = np.array(scenario(BOX).contact_names)
-    gone = {names[i] for i in np.flatnonzero(~history.kept[lost].all(axis=0))}
-    assert gone == {"edge_left", "edge_right"}
-    assert 10.0 < np.degrees(trace.tilt[lost[0]]) < 30.0
-    assert any(re.match(r"Contact edge_\w+ let go at", f) for f in report.sentences)
+    assert [failure.cause for failure in report.failures] == ["friction right", "friction left"]
+    assert 70.0 < np.degrees(trace.tilt[trace.t >= report.failures[0].t][0]) < 90.0
+    assert history.kept[settled(BOX, trace)].all()
     assert abs(report.tilt.final_deg - 90.0) <= 0.1
     assert report.tilt.max_error_deg <= 0.2
 

@@ -75,13 +75,22 @@ SENTENCE = re.compile(
 )
 
 
+def lasting(flags):
+    """The flags of stretches of more than 5 steps, 5 ms here."""
+    kept, start = np.zeros_like(flags), 0
+    for end in [*(np.flatnonzero(np.diff(flags)) + 1).tolist(), len(flags)]:
+        kept[start:end] = flags[start] and end - start > 5
+        start = end
+    return kept
+
+
 def first_row(name, outcome, contact, what):
     """The first settled step at which a contact did what a sentence says of it."""
     s, trace, history = scenario(name), outcome.trace, outcome.history
     i = s.contact_names.index(contact)
     allowed = 1e-3 * s.tolerances.slip_mm
     did = {
-        "let go": history.w_measured_C[:, i, N] <= 0.0,
+        "let go": lasting(settled(name, trace) & (history.w_measured_C[:, i, N] <= 0.0)),
         "slipped": history.slip[:, i] > allowed,
         "slid": history.slide[:, i] > allowed,
     }[what]

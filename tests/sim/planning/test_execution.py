@@ -163,8 +163,8 @@ def test_a_plan_over_the_tilt_is_the_plan_over_time():
     ("wrong", "named"),
     [
         (["--plan", "most-time"], "least-time"),
-        (["--stretch", "2"], "--plan"),
-        (["--robust"], "--plan"),
+        (["--stretch", "2"], "--stretch: got 2.0; valid is left out without a plan"),
+        (["--robust"], "--robust: got True; valid is left out without a plan"),
         (["--plan", "least-time", "--stretch", "0"], "stretch"),
         (["--plan", "least-effort", "--duration", "0"], "duration"),
     ],

@@ -51,7 +51,7 @@ def test_a_robust_plan_says_how_much_of_the_set_it_serves(tmp_path, capsys):
     # Mass and centre of mass have 16 corners, hands with opposite normals 4 extreme places.
     assert content["loads"] == 1 + 16 * 4
     assert np.shape(content["stations"]["torque"]) == (65, 38, 14)
-    assert "65 worlds: 100 % of the set" in capsys.readouterr().out
+    assert "65 worlds: in 100 %" in capsys.readouterr().out
     # The certain plan takes 1.07 s on this grid.
     assert 1.1 < content["duration_s"] < 1.15
 
@@ -94,7 +94,7 @@ def test_bad_options_are_refused_in_one_line(tmp_path, capsys, wrong):
     assert (code, content) == (2, None)
     message = capsys.readouterr().err
     assert message.count("\n") == 1
-    assert wrong[0].strip("-").replace("-", "_") in message
+    assert wrong[0] in message
 
 
 def test_a_folder_with_something_in_it_is_left_alone(tmp_path):

@@ -123,7 +123,7 @@ def test_the_text_of_the_verdict_holds_verdict_contacts_and_failures(result):
     assert text.startswith("# box-tilt: FAIL\n")
     assert "- Contact left let go." in text
     for name, contact in report.contacts.items():
-        assert f"| {name} | 100.0 | {contact.slip_mm:.3f} |" in text
+        assert f"| {name} | 100.0 | 0 | {contact.slip_mm:.3f} |" in text
 
 
 def test_without_a_folder_nothing_is_written_and_the_run_is_the_same(result, tmp_path, monkeypatch):
