@@ -111,7 +111,7 @@ def prepared_request(
     """
     preset, seed, values = worlds
     whole("seed", seed, least=0)
-    name = controller or default_controller(planning is not None)
+    name = default_controller(planning is not None) if controller is None else controller
     control = chosen_control(scene, name, objective)
     if planning is None and duration is not None:
         scene = replace(scene, phases=stretched(scene.phases, duration))

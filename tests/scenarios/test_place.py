@@ -51,7 +51,7 @@ def test_place_writes_a_file_whose_gain_another_command_confirms(file, capsys):
     given = file.read_text("utf-8")
     assert main(["place", str(file), "--goal", "heaviest", "--controller", "margin", *QUICK]) == 0
     said = capsys.readouterr().out
-    assert "BETTER" in said and "in closed loop: PASS" in said
+    assert "BETTER" in said and "In closed loop: PASS" in said
     assert file.read_text("utf-8") == given
     out = file.with_name("short-placed.toml")
     weights = []
