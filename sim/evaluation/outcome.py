@@ -120,7 +120,7 @@ def _speeds(thing: Object, quat_WO: Array, twist: Array) -> Array:
 
 
 def distance_off(scenario: Scenario, trace: Trace, tilt: float) -> float:
-    """Return the final distance of the object's mass to the path's pose at a tilt [rad] [m]."""
+    """Return the final distance [m] of the object's mass to the pose at a tilt in radians."""
     thing = scenario.object
     R_WO, p_WO = object_path(scenario.path).pose(tilt)
     (R_end,) = rotations(trace.quat_WO[-1:])
