@@ -53,6 +53,7 @@ class RunCommand(common.Planned):
         from fulcrum.sim.planning import PlanError
         from fulcrum.sim.run import UnholdableError
         from fulcrum.sim.run.execute import execute as run
+        from fulcrum.sim.scenario import default_controller
 
         try:
             request, prepared = self._request()
@@ -60,7 +61,7 @@ class RunCommand(common.Planned):
             with common.progress_bar(request.scenario.name) as progress:
                 result = run(request, progress, prepared)
         except UnholdableError as error:
-            show(error.explanation.page(self.controller or "robust"))
+            show(error.explanation.page(self.controller or default_controller(planned=False)))
             refuse("no forces hold the object; --best-effort runs it with the nearest ones.")
             return common.FAILED
         except PlanError as error:

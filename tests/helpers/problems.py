@@ -253,3 +253,8 @@ def _preloaded_beyond_torque(rng: np.random.Generator, problem: Problem) -> Prob
     limit = np.array([preload * rng.uniform(0.3, 0.99)])
     joints = Joints(("slider",), J_C, np.zeros(1), -limit, limit)
     return replace(problem, contacts=contacts, joints=joints)
+
+
+def load(problem: Problem) -> float:
+    """The scale of the forces in a problem [N, N·m]."""
+    return max(float(np.abs(problem.w_ext_O).max()), *(c.f_n_min for c in problem.contacts))

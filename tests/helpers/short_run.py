@@ -59,5 +59,10 @@ def gap(row):
     return slice(row, row + 6)
 
 
+def let_go(trace, history):
+    """The trace, and a history in which the left edge lets go."""
+    return trace, changed(history, "kept", (gap(ROW), EDGE_LEFT), False)
+
+
 def when(trace, row):
     return f"{trace.t[row]:.2f} s (tilt {np.degrees(trace.tilt[row]):.1f} deg)"

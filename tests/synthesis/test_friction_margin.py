@@ -20,17 +20,11 @@ from tests.helpers.margins import least_utilisation, margins, palms, slope, sque
 from tests.helpers.problems import (
     arms,
     box,
+    load,
     random_feasible,
 )
 
-# Both solve to 1e-8 at worst, relative to forces that may be a hundred times the value.
-AGREEMENT = 1e-6
 SYNTHESIZER = Synthesizer()
-
-
-def load(problem):
-    """The scale of the forces in a problem [N, N·m]."""
-    return max(np.abs(problem.w_ext_O).max(), *(c.f_n_min for c in problem.contacts))
 
 
 # --- the friction margin ---

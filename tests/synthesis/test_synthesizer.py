@@ -23,6 +23,7 @@ from tests.helpers.problems import (
     arms,
     box,
     cylinder,
+    load,
     random_feasible,
     random_infeasible,
 )
@@ -30,11 +31,6 @@ from tests.helpers.problems import (
 # Both solve to 1e-8 at worst, relative to forces that may be a hundred times the value.
 AGREEMENT = 1e-6
 SYNTHESIZER = Synthesizer()
-
-
-def load(problem):
-    """The scale of the forces in a problem [N, N·m]."""
-    return max(np.abs(problem.w_ext_O).max(), *(c.f_n_min for c in problem.contacts))
 
 
 def assert_agrees_with_reference(problem):

@@ -22,8 +22,7 @@ from tests.helpers.short_run import (
     SCENARIO,
     changed,
     gap,
-    judge_of,
-    short_run,
+    let_go,
     when,
 )
 
@@ -40,26 +39,12 @@ REPORT_KEYS = {
 }
 
 
-@pytest.fixture
-def run():
-    return short_run()
-
-
-@pytest.fixture
-def judge():
-    return judge_of(SCENARIO)
-
-
 def joint_index(name):
     return RobotModel(SCENARIO).joints.index(name)
 
 
 # One tampering each: what is changed in (trace, history), and the sentence that must come of it.
 # Those that last to the end set all rows from ROW on.
-def let_go(trace, history):
-    return trace, changed(history, "kept", (gap(ROW), EDGE_LEFT), False)
-
-
 def slipped(trace, history):
     return trace, changed(history, "slip", (slice(ROW, None), LEFT), 4.0e-4)
 

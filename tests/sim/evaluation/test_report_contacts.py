@@ -10,7 +10,6 @@ from fulcrum.sim.scenario.phases import Phase
 from fulcrum.synthesis.arrays import N
 from fulcrum.synthesis.render import to_markdown
 from tests.helpers.short_run import (
-    EDGE_LEFT,
     INFO,
     LAST,
     LEFT,
@@ -22,23 +21,9 @@ from tests.helpers.short_run import (
     changed,
     gap,
     judge_of,
-    short_run,
+    let_go,
     when,
 )
-
-
-@pytest.fixture
-def run():
-    return short_run()
-
-
-@pytest.fixture
-def judge():
-    return judge_of(SCENARIO)
-
-
-def let_go(trace, history):
-    return trace, changed(history, "kept", (gap(ROW), EDGE_LEFT), False)
 
 
 def test_drift_after_a_contact_has_let_go_does_not_count(judge, run):
